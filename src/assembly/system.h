@@ -1,0 +1,33 @@
+// The assembled plant: second-order equations in minimal coordinates.
+//
+//   M q̈ + C q̇ + K q = F u
+//   y = Y_0 q + Y_1 q̇ + Y_2 q̈ + D u
+//
+// Built from a pb_plant: component coordinates are stacked, locked joint directions give G q = 0, and
+// with N an orthonormal basis of null(G), q = N q_r: M_r = NᵀMN and so on. Column-major matrices.
+#ifndef PB_ASSEMBLY_SYSTEM_H
+#define PB_ASSEMBLY_SYSTEM_H
+
+#include <stddef.h>
+
+#include "base/status.h"
+#include "plant/plant.h"
+
+typedef struct pb_system {
+  size_t n, nu, ny;       // degrees of freedom, inputs, outputs
+  double *m, *c, *k;      // n × n; m positive definite
+  double *f;              // n × nu
+  double *y0, *y1, *y2;   // ny × n
+  double *d;              // ny × nu
+  const pb_plant *plant;  // names and rates; must outlive the system
+} pb_system;
+
+// Assembles. [init] Fails with PB_ERR_SINGULAR (a massless motion without stiffness, naming its
+// component; no degree of freedom left), PB_ERR_GEOMETRY (frames of a connection that do not
+// coincide), PB_ERR_MEMORY, PB_ERR_NUMERIC.
+pb_status pb_system_assemble(const pb_plant *plant, pb_warnings *warnings, pb_system **out,
+                             pb_error *err);
+
+void pb_system_free(pb_system *system);
+
+#endif
