@@ -1,0 +1,263 @@
+// Putting a pb_model together: see build.h.
+#include "model/build.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/lapack.h"
+#include "base/text.h"
+#include "model/block.h"
+
+static const double two_pi = 6.283185307179586476925286766559;
+
+static void *array(size_t count, size_t size) { return calloc(count ? count : 1, size); }
+
+pb_model *pb_model_allocate(size_t nx, size_t nu, size_t ny, size_t modes, size_t blocks,
+                            size_t values) {
+  pb_model *m = calloc(1, sizeof *m);
+  if (!m) return NULL;
+  m->nx = nx, m->nu = nu, m->ny = ny, m->modes = m->dof = modes, m->blocks = blocks;
+  m->input = array(nu, sizeof *m->input);
+  m->output = array(ny, sizeof *m->output);
+  m->mode_hz = array(modes, sizeof(double));
+  m->mode_damping = array(modes, sizeof(double));
+  m->block_start = array(blocks + 1, sizeof(size_t));
+  m->block_value = array(blocks + 1, sizeof(size_t));
+  m->a = array(values, sizeof(double));
+  m->ad = array(values, sizeof(double));
+  m->b = array(nx * nu, sizeof(double));
+  m->bd = array(nx * nu, sizeof(double));
+  m->c = array(ny * nx, sizeof(double));
+  m->d = array(ny * nu, sizeof(double));
+  if (m->input && m->output && m->mode_hz && m->mode_damping && m->block_start && m->block_value &&
+      m->a && m->ad && m->b && m->bd && m->c && m->d)
+    return m;
+  pb_model_free(m);
+  return NULL;
+}
+
+static void free_signals(pb_signal *signal, size_t count) {
+  for (size_t i = 0; signal && i < count; i++) {
+    free(signal[i].name);
+    free(signal[i].unit);
+  }
+  free(signal);
+}
+
+void pb_model_free(pb_model *m) {
+  if (!m) return;
+  free_signals(m->input, m->nu);
+  free_signals(m->output, m->ny);
+  free(m->name);
+  free(m->mode_hz);
+  free(m->mode_damping);
+  free(m->block_start);
+  free(m->block_value);
+  free(m->a);
+  free(m->ad);
+  free(m->b);
+  free(m->bd);
+  free(m->c);
+  free(m->d);
+  free(m);
+}
+
+double pb_block_frequency(const double *a, size_t size) {
+  if (size == 1) return fabs(a[0]);
+  if (size == 2) return sqrt(fabs(a[0] * a[3] - a[1] * a[2]));
+  double sum = 0;
+  for (size_t i = 0; i < size * size; i++) sum += a[i] * a[i];
+  return sqrt(sum / (double)size);
+}
+
+pb_status pb_model_builder_open(pb_model_builder *b, size_t nx, size_t nu, size_t ny, size_t modes,
+                                pb_error *err) {
+  b->capacity = 2 * nx;
+  b->model = pb_model_allocate(nx, nu, ny, modes, nx, b->capacity);  // at most nx blocks
+  if (!b->model) return pb_fail_memory(err, "");
+  b->model->blocks = 0;
+  return PB_OK;
+}
+
+void pb_model_builder_discard(pb_model_builder *b) {
+  pb_model_free(b->model);
+  *b = (pb_model_builder){0};
+}
+
+// Copies a block into model m at its end; its arrays are large enough.
+static void append(pb_model *m, const pb_model_part *p) {
+  size_t start = m->block_start[m->blocks], value = m->block_value[m->blocks];
+  for (size_t j = 0; j < p->size; j++)
+    memcpy(m->a + value + j * p->size, p->a + j * p->lda, p->size * sizeof(double));
+  for (size_t i = 0; i < m->nu; i++)
+    memcpy(m->b + start + i * m->nx, p->b + i * p->ldb, p->size * sizeof(double));
+  for (size_t j = 0; j < p->size; j++)
+    memcpy(m->c + (start + j) * m->ny, p->c + j * p->ldc, m->ny * sizeof(double));
+  m->blocks++;
+  m->block_start[m->blocks] = start + p->size;
+  m->block_value[m->blocks] = value + p->size * p->size;
+}
+
+pb_status pb_model_builder_add(pb_model_builder *b, const pb_model_part *part, pb_error *err) {
+  pb_model *m = b->model;
+  size_t needed = m->block_value[m->blocks] + part->size * part->size;
+  if (needed > b->capacity) {
+    size_t capacity = 2 * b->capacity > needed ? 2 * b->capacity : needed;
+    double *a = realloc(m->a, capacity * sizeof *a);
+    if (!a) return pb_fail_memory(err, "");
+    m->a = a;
+    b->capacity = capacity;
+  }
+  append(m, part);
+  return PB_OK;
+}
+
+static pb_model_part part_of(const pb_model *m, size_t block) {
+  size_t start = m->block_start[block], size = m->block_start[block + 1] - start;
+  return (pb_model_part){.size = size,
+                         .a = m->a + m->block_value[block],
+                         .lda = size,
+                         .b = m->b + start,
+                         .ldb = m->nx,
+                         .c = m->c + start * m->ny,
+                         .ldc = m->ny};
+}
+
+// D += −C A⁻¹ B of one block.
+static pb_status add_static(pb_model *m, const pb_model_part *p, pb_error *err) {
+  size_t n = p->size;
+  int size = (int)n, nu = (int)m->nu, info = 0;
+  double *a = malloc(n * n * sizeof *a), *x = malloc(n * m->nu * sizeof *x);
+  int *pivot = malloc(n * sizeof *pivot);
+  pb_status st = PB_OK;
+  if (!a || !x || !pivot) {
+    st = pb_fail_memory(err, "/max_frequency");
+    goto done;
+  }
+  memcpy(a, p->a, n * n * sizeof *a);
+  for (size_t i = 0; i < m->nu; i++) memcpy(x + i * n, p->b + i * p->ldb, n * sizeof *x);
+  dgesv_(&size, &nu, a, &size, pivot, x, &size, &info);
+  if (info) {
+    st = pb_fail(err, PB_ERR_NUMERIC, "/max_frequency", "a mode above it has no static response");
+    goto done;
+  }
+  for (size_t i = 0; i < m->nu; i++)
+    for (size_t o = 0; o < m->ny; o++)
+      for (size_t j = 0; j < n; j++) m->d[o + i * m->ny] -= p->c[o + j * p->ldc] * x[j + i * n];
+done:
+  free(a);
+  free(x);
+  free(pivot);
+  return st;
+}
+
+typedef struct rank {
+  size_t block;
+  bool odd;  // not 2 × 2: last
+  double frequency;
+} rank;
+
+static int rank_order(const void *a, const void *b) {
+  const rank *x = a, *y = b;
+  if (x->odd != y->odd) return x->odd ? 1 : -1;
+  if (x->frequency != y->frequency) return x->frequency < y->frequency ? -1 : 1;
+  return (x->block > y->block) - (x->block < y->block);
+}
+
+static void copy_header(const pb_model *from, pb_model *to) {
+  to->sample_rate = from->sample_rate;
+  to->dof = from->dof;
+  memcpy(to->mode_hz, from->mode_hz, from->modes * sizeof(double));
+  memcpy(to->mode_damping, from->mode_damping, from->modes * sizeof(double));
+  memcpy(to->d, from->d, from->ny * from->nu * sizeof(double));
+}
+
+static pb_status copy_names(const pb_model *from, pb_model *to, pb_error *err) {
+  to->name = from->name ? pb_text_copy(from->name) : NULL;
+  bool ok = !from->name || to->name;
+  for (size_t i = 0; i < from->nu + from->ny && ok; i++) {
+    const pb_signal *s = i < from->nu ? &from->input[i] : &from->output[i - from->nu];
+    pb_signal *t = i < from->nu ? &to->input[i] : &to->output[i - from->nu];
+    t->name = pb_text_copy(s->name);
+    t->unit = pb_text_copy(s->unit);
+    ok = t->name && t->unit;
+  }
+  return ok ? PB_OK : pb_fail_memory(err, "");
+}
+
+// The blocks of m in order, those above hz (0: none) gone into d.
+static pb_status rebuild(const pb_model *m, double hz, pb_model **out, pb_error *err) {
+  double limit = hz > 0 ? two_pi * hz : INFINITY;
+  size_t kept = 0, nx = 0, values = 0;
+  rank *order = malloc((m->blocks + 1) * sizeof *order);
+  if (!order) return pb_fail_memory(err, "");
+  for (size_t k = 0; k < m->blocks; k++) {
+    pb_model_part p = part_of(m, k);
+    order[k] = (rank){k, p.size != 2, pb_block_frequency(p.a, p.size)};
+    if (order[k].frequency > limit) continue;
+    kept++, nx += p.size, values += p.size * p.size;
+  }
+  qsort(order, m->blocks, sizeof *order, rank_order);
+  pb_model *copy = pb_model_allocate(nx, m->nu, m->ny, m->modes, kept, values);
+  pb_status st = copy ? copy_names(m, copy, err) : pb_fail_memory(err, "");
+  if (!st) {
+    copy_header(m, copy);
+    copy->max_frequency = hz;
+    copy->blocks = 0;
+  }
+  for (size_t k = 0; k < m->blocks && !st; k++) {
+    pb_model_part p = part_of(m, order[k].block);
+    if (order[k].frequency > limit)
+      st = add_static(copy, &p, err);
+    else
+      append(copy, &p);
+  }
+  if (!st) st = pb_model_discretize(copy, err);
+  free(order);
+  if (st) {
+    pb_model_free(copy);
+  } else {
+    *out = copy;
+  }
+  return st;
+}
+
+pb_status pb_model_builder_close(pb_model_builder *b, double max_frequency, pb_model **out,
+                                 pb_error *err) {
+  pb_status st = rebuild(b->model, max_frequency, out, err);
+  pb_model_builder_discard(b);
+  return st;
+}
+
+pb_status pb_model_truncate(const pb_model *model, double hz, pb_model **out, pb_error *err) {
+  *out = NULL;
+  if (!(hz > 0)) return pb_fail(err, PB_ERR_ARGUMENT, "max_frequency", "expected a number > 0");
+  return rebuild(model, hz, out, err);
+}
+
+pb_status pb_model_discretize(pb_model *m, pb_error *err) {
+  m->pairs = m->widest = 0;
+  for (size_t k = 0; k < m->blocks; k++) {
+    size_t size = m->block_start[k + 1] - m->block_start[k];
+    if (size > m->widest) m->widest = size;
+    if (size == 2 && m->pairs == k) m->pairs++;
+  }
+  double *gd = malloc((m->widest * m->widest + 1) * sizeof *gd);
+  if (!gd) return pb_fail_memory(err, "");
+  pb_status st = PB_OK;
+  for (size_t k = 0; k < m->blocks && !st; k++) {
+    size_t start = m->block_start[k], n = m->block_start[k + 1] - start, at = m->block_value[k];
+    st = pb_block_discretize(n, m->a + at, 1 / m->sample_rate, m->ad + at, gd, err);
+    for (size_t i = 0; i < m->nu && !st; i++) {
+      const double *b = m->b + start + i * m->nx;
+      double *bd = m->bd + start + i * m->nx;
+      for (size_t r = 0; r < n; r++) {
+        bd[r] = 0;
+        for (size_t c = 0; c < n; c++) bd[r] += gd[r + c * n] * b[c];
+      }
+    }
+  }
+  free(gd);
+  return st;
+}

@@ -1,0 +1,198 @@
+// Frequency responses, poles and static gains of a compiled plant, block by block: see model.h.
+//
+//   H(p) = Σ_blocks C_b (p I − A_b)⁻¹ B_b + D        (sampled: A_d, B_d, and D z⁻¹)
+#include <complex.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/lapack.h"
+#include "model/model.h"
+
+static const double two_pi = 6.283185307179586476925286766559;
+
+typedef struct basis {
+  const double *a, *b;
+} basis;
+
+static basis choose(const pb_model *m, pb_time_base base) {
+  return base == PB_SAMPLED ? (basis){m->ad, m->bd} : (basis){m->a, m->b};
+}
+
+// r = (p I − A)⁻¹ for a 2 × 2 block, column-major.
+static void resolvent(const double *a, double complex p, double complex r[4]) {
+  double complex d0 = p - a[0], d3 = p - a[3];
+  double complex det = d0 * d3 - a[1] * a[2];
+  r[0] = d3 / det;
+  r[1] = a[1] / det;
+  r[2] = a[2] / det;
+  r[3] = d0 / det;
+}
+
+// h += C_b x, and dh −= C_b (p I − A)⁻¹ x with r the resolvent, for one input column.
+static void add_pair(const pb_model *m, size_t start, const double complex r[4], double b0,
+                     double b1, double complex *h, double complex *dh, size_t input) {
+  double complex x0 = r[0] * b0 + r[2] * b1, x1 = r[1] * b0 + r[3] * b1;
+  const double *c0 = m->c + start * m->ny, *c1 = c0 + m->ny;
+  for (size_t o = 0; o < m->ny; o++) h[o * m->nu + input] += c0[o] * x0 + c1[o] * x1;
+  if (!dh) return;
+  double complex y0 = r[0] * x0 + r[2] * x1, y1 = r[1] * x0 + r[3] * x1;
+  for (size_t o = 0; o < m->ny; o++) dh[o * m->nu + input] -= c0[o] * y0 + c1[o] * y1;
+}
+
+// The same for a block of any size n, all inputs. `work` holds n² + n nu complex numbers. Where the
+// point is a pole of the block, the response is infinite.
+static void add_block(const pb_model *m, const basis *at, size_t k, double complex p,
+                      double complex *h, double complex *dh, double complex *work, int *pivot) {
+  size_t start = m->block_start[k], n = m->block_start[k + 1] - start;
+  const double *a = at->a + m->block_value[k];
+  double complex *matrix = work, *x = work + n * n;
+  int size = (int)n, nu = (int)m->nu, info = 0;
+  for (size_t i = 0; i < m->nu; i++)
+    for (size_t r = 0; r < n; r++) x[r + i * n] = at->b[start + r + i * m->nx];
+  for (int order = 0; order < (dh ? 2 : 1); order++) {
+    for (size_t i = 0; i < n * n; i++) matrix[i] = (i % (n + 1) == 0 ? p : 0) - a[i];
+    zgesv_(&size, &nu, matrix, &size, pivot, x, &size, &info);
+    for (size_t i = 0; i < m->nu; i++)
+      for (size_t o = 0; o < m->ny; o++) {
+        double complex sum = info ? INFINITY : 0;
+        for (size_t r = 0; r < n && !info; r++) sum += m->c[o + (start + r) * m->ny] * x[r + i * n];
+        if (order == 0)
+          h[o * m->nu + i] += sum;
+        else
+          dh[o * m->nu + i] -= sum;
+      }
+  }
+}
+
+// `work` and `pivot` serve the blocks above 2 × 2 and may be NULL without such blocks.
+static void evaluate(const pb_model *m, pb_time_base base, double complex p, double complex *h,
+                     double complex *dh, double complex *work, int *pivot) {
+  basis at = choose(m, base);
+  double complex through = base == PB_SAMPLED ? 1 / p : 1;
+  for (size_t o = 0; o < m->ny; o++) {
+    for (size_t i = 0; i < m->nu; i++) {
+      h[o * m->nu + i] = m->d[o + i * m->ny] * through;
+      if (dh) dh[o * m->nu + i] = base == PB_SAMPLED ? -m->d[o + i * m->ny] / (p * p) : 0;
+    }
+  }
+  for (size_t k = 0; k < m->pairs; k++) {
+    double complex r[4];
+    size_t start = m->block_start[k];
+    resolvent(at.a + m->block_value[k], p, r);
+    for (size_t i = 0; i < m->nu; i++) {
+      const double *b = at.b + start + i * m->nx;
+      if (b[0] == 0 && b[1] == 0) continue;
+      add_pair(m, start, r, b[0], b[1], h, dh, i);
+    }
+  }
+  for (size_t k = m->pairs; k < m->blocks; k++) add_block(m, &at, k, p, h, dh, work, pivot);
+}
+
+// Scratch of `evaluate` for models with blocks above 2 × 2.
+static bool scratch_new(const pb_model *m, double complex **work, int **pivot) {
+  *work = NULL;
+  *pivot = NULL;
+  if (m->pairs == m->blocks) return true;
+  *work = malloc((m->widest * m->widest + m->widest * m->nu + 1) * sizeof **work);
+  *pivot = malloc((m->widest + 1) * sizeof **pivot);
+  return *work && *pivot;
+}
+
+void pb_model_evaluate(const pb_model *m, pb_time_base base, double complex point,
+                       double complex *h, double complex *dh) {
+  double complex *work;
+  int *pivot;
+  if (scratch_new(m, &work, &pivot)) {
+    evaluate(m, base, point, h, dh, work, pivot);
+  } else {
+    for (size_t i = 0; i < m->ny * m->nu; i++) {
+      h[i] = NAN;
+      if (dh) dh[i] = NAN;
+    }
+  }
+  free(work);
+  free(pivot);
+}
+
+pb_status pb_model_frf(const pb_model *m, pb_time_base base, const double *hz, size_t nf,
+                       double complex *h, pb_error *err) {
+  for (size_t f = 0; f < nf; f++)
+    if (!isfinite(hz[f]) || hz[f] < 0)
+      return pb_fail(err, PB_ERR_ARGUMENT, "frequency", "%g Hz is not a frequency", hz[f]);
+  double complex *work;
+  int *pivot;
+  pb_status st = scratch_new(m, &work, &pivot) ? PB_OK : pb_fail_memory(err, "");
+  for (size_t f = 0; f < nf && !st; f++) {
+    double w = two_pi * hz[f];
+    double complex p = base == PB_SAMPLED ? cexp(I * w / m->sample_rate) : I * w;
+    evaluate(m, base, p, h + f * m->ny * m->nu, NULL, work, pivot);
+  }
+  free(work);
+  free(pivot);
+  return st;
+}
+
+static void pair_poles(const double *a, double complex out[2]) {
+  double mean = 0.5 * (a[0] + a[3]), half = 0.5 * (a[0] - a[3]);
+  double discriminant = half * half + a[1] * a[2];
+  if (discriminant < 0) {
+    out[0] = mean + I * sqrt(-discriminant);
+    out[1] = conj(out[0]);
+    return;
+  }
+  // The larger root first; the other from the product, free of cancellation.
+  double root = mean < 0 ? mean - sqrt(discriminant) : mean + sqrt(discriminant);
+  out[0] = root;
+  out[1] = root != 0 ? (a[0] * a[3] - a[1] * a[2]) / root : 0;
+}
+
+static pb_status block_poles(const double *a, size_t size, double complex *out, pb_error *err) {
+  int n = (int)size, one = 1, info = 0, lwork = 8 * n;
+  double none = 0;
+  double *copy = malloc(size * size * sizeof *copy), *work = malloc((size_t)lwork * sizeof *work);
+  double *wr = malloc(size * sizeof *wr), *wi = malloc(size * sizeof *wi);
+  pb_status st = PB_OK;
+  if (!copy || !work || !wr || !wi) {
+    st = pb_fail_memory(err, "");
+    goto done;
+  }
+  memcpy(copy, a, size * size * sizeof *copy);
+  dgeev_("N", "N", &n, copy, &n, wr, wi, &none, &one, &none, &one, work, &lwork, &info);
+  if (info) st = pb_fail(err, PB_ERR_NUMERIC, "", "the poles of a block did not converge");
+  for (size_t i = 0; i < size && !st; i++) out[i] = wr[i] + I * wi[i];
+done:
+  free(copy);
+  free(work);
+  free(wr);
+  free(wi);
+  return st;
+}
+
+pb_status pb_model_poles(const pb_model *m, pb_time_base base, double complex *poles,
+                         pb_error *err) {
+  const double *values = choose(m, base).a;
+  pb_status st = PB_OK;
+  for (size_t k = 0; k < m->blocks && !st; k++) {
+    size_t start = m->block_start[k], size = m->block_start[k + 1] - start;
+    const double *a = values + m->block_value[k];
+    if (size == 1)
+      poles[start] = a[0];
+    else if (size == 2)
+      pair_poles(a, poles + start);
+    else
+      st = block_poles(a, size, poles + start, err);
+  }
+  return st;
+}
+
+pb_status pb_model_dc(const pb_model *m, double *gain, pb_error *err) {
+  double complex *h = malloc((m->ny * m->nu + 1) * sizeof *h);
+  if (!h) return pb_fail_memory(err, "");
+  const double zero = 0;
+  pb_status st = pb_model_frf(m, PB_CONTINUOUS, &zero, 1, h, err);
+  for (size_t i = 0; i < m->ny * m->nu && !st; i++)
+    gain[i] = isfinite(creal(h[i])) ? creal(h[i]) : INFINITY;
+  free(h);
+  return st;
+}

@@ -1,0 +1,70 @@
+// Stepping a compiled plant: see model.h. Nothing here allocates, locks or fails.
+#include <stdlib.h>
+#include <string.h>
+
+#include "model/model.h"
+
+size_t pb_state_bytes(const pb_model *m) {
+  size_t scratch = m->pairs < m->blocks ? m->widest : 0;
+  return sizeof(pb_state) + (m->nx + m->nu + scratch) * sizeof(double);
+}
+
+pb_state *pb_state_new(const pb_model *m) {
+  pb_state *s = calloc(1, pb_state_bytes(m));
+  if (s) pb_state_reset(m, s);
+  return s;
+}
+
+void pb_state_reset(const pb_model *m, pb_state *s) {
+  memset(s, 0, pb_state_bytes(m));
+  s->nx = m->nx;
+  s->nu = m->nu;
+}
+
+void pb_step_output(const pb_model *m, const pb_state *s, double *y) {
+  const double *x = s->data, *u = s->data + m->nx;
+  size_t ny = m->ny;
+  for (size_t o = 0; o < ny; o++) y[o] = 0;
+  for (size_t j = 0; j < m->nx; j++) {
+    const double *c = m->c + j * ny;
+    for (size_t o = 0; o < ny; o++) y[o] += c[o] * x[j];
+  }
+  for (size_t i = 0; i < m->nu; i++) {
+    const double *d = m->d + i * ny;
+    for (size_t o = 0; o < ny; o++) y[o] += d[o] * u[i];
+  }
+}
+
+// x ← A_d x over the 2 × 2 blocks.
+static void advance_pairs(const double *ad, double *x, size_t pairs) {
+  for (size_t k = 0; k < pairs; k++, ad += 4, x += 2) {
+    double x0 = x[0], x1 = x[1];
+    x[0] = ad[0] * x0 + ad[2] * x1;
+    x[1] = ad[1] * x0 + ad[3] * x1;
+  }
+}
+
+// x ← A_d x for a block of another size.
+static void advance_block(const double *ad, size_t n, double *x, double *scratch) {
+  memcpy(scratch, x, n * sizeof *x);
+  for (size_t i = 0; i < n; i++) x[i] = 0;
+  for (size_t j = 0; j < n; j++)
+    for (size_t i = 0; i < n; i++) x[i] += ad[i + j * n] * scratch[j];
+}
+
+void pb_step_advance(const pb_model *m, pb_state *s, const double *u) {
+  double *x = s->data, *held = s->data + m->nx;
+  advance_pairs(m->ad, x, m->pairs);
+  for (size_t k = m->pairs; k < m->blocks; k++) {
+    size_t start = m->block_start[k];
+    advance_block(m->ad + m->block_value[k], m->block_start[k + 1] - start, x + start,
+                  held + m->nu);
+  }
+  for (size_t i = 0; i < m->nu; i++) {
+    const double *b = m->bd + i * m->nx;
+    double ui = u[i];
+    held[i] = ui;
+    for (size_t j = 0; j < m->nx; j++) x[j] += b[j] * ui;
+  }
+  s->step++;
+}
