@@ -1,0 +1,31 @@
+// Poles (and zeros) of sampled systems in the engineer's terms: s = ln(z)·f_s.
+#ifndef PB_CONTROL_POLES_H
+#define PB_CONTROL_POLES_H
+
+#include <complex.h>
+#include <stddef.h>
+
+typedef struct pb_pole {
+  double complex z;
+  double hz;      // |s| / 2π
+  double damping; // −Re s / |s|; negative: unstable
+} pb_pole;
+
+// Zero-initialise; free with pb_pole_list_clear.
+typedef struct pb_pole_list {
+  size_t count;
+  pb_pole *item;
+} pb_pole_list;
+
+// [any]
+pb_pole pb_pole_from_z(double complex z, double sample_rate);
+
+// s = ln(z)·f_s in rad/s. [any]
+double complex pb_pole_s(double complex z, double sample_rate);
+
+// Ascending frequency. [any]
+void pb_pole_sort(pb_pole *pole, size_t count);
+
+void pb_pole_list_clear(pb_pole_list *list);
+
+#endif

@@ -1,0 +1,7 @@
+# Signals and control (src/signal, src/control).
+pb_test(fft LABELS unit SOURCES test_fft.c)
+pb_test(excitation LABELS unit SOURCES test_excitation.c)
+pb_test(spectrum LABELS unit SOURCES test_spectrum.c)
+pb_test(lti LABELS unit SOURCES test_lti.c)
+pb_test(loop LABELS unit SOURCES test_loop.c)
+pb_test(fit LABELS unit SOURCES test_fit.c)
