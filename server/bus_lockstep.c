@@ -1,0 +1,128 @@
+// Lockstep: commands are taken, judged and answered with the next sample in the listener of the
+// command reader, without a change of thread.
+#include <stdio.h>
+#include <string.h>
+
+#include "daemon.h"
+#include "fpenv.h"
+
+void pb_bus_publish_sample(pb_daemon *d) {
+  const pb_record *r = &d->current;
+  const size_t nu = d->model->nu, ny = d->model->ny;
+  plantbus_Sample s = {.step = r->step,
+                       .time_ns = (int64_t)((double)r->step / d->model->sample_rate * 1e9 + 0.5),
+                       .epoch = r->epoch,
+                       .revision = 1,
+                       .flags = r->flags,
+                       .input_count = (uint32_t)nu,
+                       .output_count = (uint32_t)ny,
+                       .decimation = d->engine.decimation};
+  memcpy(s.input, r->u, nu * sizeof(double));
+  memcpy(s.output, r->y, ny * sizeof(double));
+  dds_write(d->sample, &s);
+  d->sample_written = pb_daemon_clock();
+}
+
+void pb_bus_note_faults(pb_daemon *d, const pb_record *record) {
+  static const char *const name[PB_FLAG_COUNT] = {"held", "late", "non-finite", "overrun"};
+  const uint32_t fresh = record->flags & ~d->faults;
+  if (!fresh) return;
+  d->faults |= fresh;
+  for (int bit = 0; bit < PB_FLAG_COUNT; bit++) {
+    if (!(fresh & (1u << bit))) continue;
+    d->fault_step[bit] = record->step;
+    pb_engine_note(&d->engine, PB_EVENT_FAULT, "fault '%s' for the first time at step %llu",
+                   name[bit], (unsigned long long)record->step);
+  }
+}
+
+static void step_once(pb_daemon *d) {
+  double u[PB_STEPPER_INPUTS];
+  bool held;
+  pb_engine_input(&d->engine, u, &held);
+  pb_stepper_step(&d->stepper, u, held ? PB_FLAG_HELD : 0);
+  d->current = d->stepper.now;
+  pb_engine_advance(&d->engine, d->current.step, pb_daemon_clock());
+  pb_bus_note_faults(d, &d->current);
+  if (d->current.step % d->engine.decimation == 0) pb_bus_publish_sample(d);
+}
+
+bool pb_bus_run_ready(pb_daemon *d) {
+  if (!pb_engine_ready(&d->engine)) return false;
+  const uint64_t saved = pb_flush_denormals();
+  for (int i = 0; i < PB_DAEMON_CHUNK && pb_engine_ready(&d->engine); i++) step_once(d);
+  pb_restore_denormals(saved);
+  return pb_engine_ready(&d->engine);
+}
+
+// The first command of a session from this writer: is it the client that attached?
+static pb_verdict command_first(pb_daemon *d, const pb_command *command) {
+  pb_member *member = pb_engine_find(&d->engine, command->session);
+  uint8_t actual[16];
+  if (!pb_bus_writer_is(d->command, command->writer, member->client, actual)) {
+    pb_engine_refuse(&d->engine, PB_VERDICT_FOREIGN);
+    return PB_VERDICT_FOREIGN;
+  }
+  member->writer = command->writer;
+  return pb_engine_command(&d->engine, command);
+}
+
+static bool command_judge(pb_daemon *d, const plantbus_Command *c, dds_instance_handle_t writer) {
+  const pb_command command = {.session = c->session,
+                              .step = c->step,
+                              .channel = c->channel,
+                              .count = c->count,
+                              .input = c->input,
+                              .writer = writer};
+  pb_verdict verdict = pb_engine_command(&d->engine, &command);
+  if (verdict == PB_VERDICT_UNKNOWN_WRITER) verdict = command_first(d, &command);
+  return verdict == PB_VERDICT_ACCEPTED || verdict == PB_VERDICT_LATE;
+}
+
+// No writer is left for the session: unregistered, dead, or silent beyond its liveliness.
+static void command_over(pb_daemon *d, uint64_t session) {
+  pb_member *member = pb_engine_find(&d->engine, session);
+  if (!member) return;
+  char why[160];
+  if (pb_engine_waiting(&d->engine) && member->barrier && !member->in)
+    snprintf(why, sizeof why, "was late at step %llu: it gives no sign of life",
+             (unsigned long long)d->engine.step);
+  else
+    snprintf(why, sizeof why, "gives no sign of life or has ended");
+  pb_engine_drop(&d->engine, member, PB_EVENT_LOST, why);
+}
+
+bool pb_bus_take_commands(pb_daemon *d, uint64_t *for_step) {
+  bool accepted = false;
+  for (;;) {
+    plantbus_Command command;
+    void *sample[1] = {&command};
+    dds_sample_info_t info;
+    if (dds_take(d->command, sample, &info, 1, 1) != 1) return accepted;
+    if (info.valid_data) {
+      if (command_judge(d, &command, info.publication_handle)) {
+        accepted = true;
+        if (for_step) *for_step = command.step ? command.step : UINT64_MAX;
+      }
+    } else if (info.instance_state != DDS_IST_ALIVE) {
+      command_over(d, command.session);
+      accepted = true;  // the inputs may have changed
+    }
+  }
+}
+
+void pb_bus_on_command(dds_entity_t reader, void *context) {
+  (void)reader;
+  pb_daemon *d = context;
+  if (atomic_load_explicit(&d->realtime_mode, memory_order_acquire)) return;
+  pthread_mutex_lock(&d->lock);
+  const uint64_t events = d->engine.events_made;
+  bool more = false;
+  if (d->listening) {
+    pb_bus_take_commands(d, NULL);
+    more = pb_bus_run_ready(d);
+  }
+  more = more || d->engine.events_made != events;
+  pthread_mutex_unlock(&d->lock);
+  if (more) dds_set_guardcondition(d->wake, true);
+}

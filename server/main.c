@@ -1,0 +1,99 @@
+// plantbusd: serves one plant until SIGINT or SIGTERM.
+#include <semaphore.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#ifdef PB_HAVE_SYSTEMD
+#include <systemd/sd-daemon.h>
+#endif
+
+#include "bus_log.h"
+#include "options.h"
+
+// Of OpenBLAS, when that is the BLAS in use.
+void openblas_set_num_threads(int count) __attribute__((weak));
+
+static void notify(const char *state) {
+#ifdef PB_HAVE_SYSTEMD
+  sd_notify(0, state);
+#else
+  (void)state;
+#endif
+}
+
+static void tell_warnings(const char *plant, pb_warnings *warnings) {
+  for (size_t i = 0; i < warnings->count; i++)
+    fprintf(stderr, "plantbusd: %s: warning: %s: %s\n", plant, warnings->item[i].where,
+            warnings->item[i].message);
+  pb_warnings_clear(warnings);
+}
+
+static void tell_ready(const pb_daemon *daemon) {
+  const pb_model *m = daemon->model;
+  printf("plantbusd: ready: plant '%s', %zu states, %g Hz, %s, domain %u\n", m->name, m->nx,
+         m->sample_rate, pb_drive_name(daemon->options.mode), daemon->options.domain);
+  fflush(stdout);
+}
+
+static sem_t end_asked;
+
+static void on_end(int signal_number) {
+  (void)signal_number;
+  sem_post(&end_asked);
+}
+
+// A handler, not sigwait: the BLAS may have started threads before main, which block nothing, and
+// the signal may be given to one of them. The daemon's own threads inherit a mask that leaves it to
+// others.
+static void signals_prepare(void) {
+  sem_init(&end_asked, 0, 0);
+  struct sigaction action = {.sa_handler = on_end, .sa_flags = SA_RESTART};
+  sigaction(SIGINT, &action, NULL);
+  sigaction(SIGTERM, &action, NULL);
+  action.sa_handler = SIG_IGN;
+  sigaction(SIGPIPE, &action, NULL);
+}
+
+static void signals_mask(int how) {
+  sigset_t set;
+  sigemptyset(&set);
+  sigaddset(&set, SIGINT);
+  sigaddset(&set, SIGTERM);
+  pthread_sigmask(how, &set, NULL);
+}
+
+static void end_wait(void) {
+  while (sem_wait(&end_asked) != 0) {
+  }
+}
+
+int main(int argc, char **argv) {
+  // One BLAS thread: the order of its sums, and so every bit of the model, is the same in each run.
+  if (openblas_set_num_threads) openblas_set_num_threads(1);
+  pb_daemon_options options;
+  pb_options_parse(argc, argv, &options);
+  signals_prepare();
+  signals_mask(SIG_BLOCK);
+  pb_daemon *daemon = calloc(1, sizeof *daemon);
+  pb_warnings warnings = {0};
+  pb_error err = {PB_OK, "", ""};
+  pb_status status =
+      daemon ? pb_daemon_start(daemon, &options, &warnings, &err) : pb_fail_memory(&err, "daemon");
+  tell_warnings(options.plant, &warnings);
+  if (status) {
+    char text[800];
+    pb_error_format(&err, text, sizeof text);
+    fprintf(stderr, "plantbusd: %s: %s\n", options.plant, text);
+    free(daemon);
+    return 1;
+  }
+  signals_mask(SIG_UNBLOCK);
+  tell_ready(daemon);
+  notify("READY=1");
+  end_wait();
+  notify("STOPPING=1");
+  pb_daemon_stop(daemon);
+  free(daemon);
+  return 0;
+}

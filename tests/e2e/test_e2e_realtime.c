@@ -1,0 +1,138 @@
+// Real time: the plant runs by the clock whatever clients do, and commands act in it.
+#include <stdatomic.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+#include "harness.h"
+
+typedef struct watch {
+  uint64_t first, last, want;
+  double begin, end;
+  bool acted, ordered;
+} watch;
+
+static double clock_seconds(void) {
+  struct timespec t;
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static bool look(void *context, const pb_sample *sample, double *command) {
+  watch *w = context;
+  w->end = clock_seconds();
+  if (w->begin == 0.0) {
+    w->begin = w->end;
+    w->first = sample->step;
+    w->ordered = true;
+  } else if (sample->step <= w->last) {
+    w->ordered = false;
+  }
+  w->last = sample->step;
+  w->acted = w->acted || sample->input[0] == 2.5;
+  command[0] = 2.5;
+  return sample->step - w->first < w->want;
+}
+
+static void run(pb_session *session, watch *w, double stall) {
+  const pb_run_options options = {.on_sample = look, .context = w, .stall = stall};
+  pb_error err = {PB_OK, "", ""};
+  if (pb_session_run(session, &options, NULL, &err)) fail_msg("%s", err.message);
+}
+
+static void the_plant_runs_at_its_rate(void **state) {
+  (void)state;
+  const char *const realtime[] = {"--mode", "realtime", NULL};
+  e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, realtime);
+  pb_session *session = e2e_open(&daemon);
+  assert_int_equal(pb_session_description(session)->mode, PB_REALTIME);
+  e2e_attach(session, "test", "Va", 0.0);
+  watch w = {.want = 10000};  // one second
+  run(session, &w, 2.0);
+  const double rate = (double)(w.last - w.first) / (w.end - w.begin);
+  assert_true(w.ordered);
+  assert_true(w.acted);
+  if (rate < 9000.0 || rate > 11000.0) fail_msg("%g steps a second instead of 10000", rate);
+  pb_session_close(session);
+  e2e_daemon_end(&daemon);
+}
+
+static void the_speed_is_a_factor(void **state) {
+  (void)state;
+  e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, NULL);
+  pb_session *session = e2e_open(&daemon);
+  e2e_request(session, "set_mode", "{\"mode\":\"realtime\",\"speed\":0.1}");
+  watch w = {.want = 500};  // half a second at a tenth of 10 kHz
+  run(session, &w, 2.0);
+  const double rate = (double)(w.last - w.first) / (w.end - w.begin);
+  if (rate < 900.0 || rate > 1100.0) fail_msg("%g steps a second instead of 1000", rate);
+  assert_false(w.acted);  // an observer: not attached
+  pb_session_close(session);
+  e2e_daemon_end(&daemon);
+}
+
+static bool lease_is_over(const plantbus_PlantStatus *s) {
+  return s->attached._length == 0;
+}
+static bool running(const plantbus_PlantStatus *s) {
+  return s->step > 2000;
+}
+
+// A client that stops keeps nobody waiting in real time, and is dropped after its lease.
+static void a_stopped_client_loses_its_lease(void **state) {
+  (void)state;
+  const char *const realtime[] = {"--mode", "realtime", "--lease", "0.2", NULL};
+  e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, realtime);
+  const e2e_raw raw = e2e_raw_join(&daemon);
+  const dds_entity_t events = e2e_raw_reader(&raw, PB_TOPIC_EVENT);
+  const dds_entity_t status = e2e_raw_reader(&raw, PB_TOPIC_STATUS);
+  char domain[16], line[256], message[320], name[64];
+  snprintf(domain, sizeof domain, "%u", daemon.domain);
+  const char *const argv[] = {PB_E2E_CLIENT, domain, "stopped", "Va", "60", NULL};
+  e2e_child client = e2e_spawn(argv);
+  e2e_expect_line(&client, "running", line);
+  assert_int_equal(kill(client.pid, SIGSTOP), 0);
+  e2e_event_wait(events, "lease_over", message);
+  snprintf(name, sizeof name, "e2e_client[%d]", (int)client.pid);
+  assert_non_null(strstr(message, name));
+  plantbus_PlantStatus_free(e2e_status_wait(status, lease_is_over), DDS_FREE_ALL);
+  plantbus_PlantStatus_free(e2e_status_wait(status, running), DDS_FREE_ALL);
+  kill(client.pid, SIGKILL);
+  e2e_reap(&client);
+  dds_delete(raw.participant);
+  e2e_daemon_end(&daemon);
+}
+
+// From one mode to the other and back, with the state of the plant carried over.
+static void modes_may_change(void **state) {
+  (void)state;
+  e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, NULL);
+  pb_session *session = e2e_open(&daemon);
+  e2e_attach(session, "test", "Va", 0.0);
+  watch lockstep = {.want = 100};
+  run(session, &lockstep, 2.0);
+  assert_int_equal(lockstep.last, 100);
+  e2e_request(session, "set_mode", "{\"mode\":\"realtime\"}");
+  watch realtime = {.want = 1000};
+  run(session, &realtime, 2.0);
+  assert_true(realtime.first >= 100);
+  e2e_request(session, "set_mode", "{\"mode\":\"lockstep\"}");
+  watch again = {.want = 100};
+  run(session, &again, 2.0);
+  assert_true(again.first >= realtime.last);
+  assert_int_equal(again.last, again.first + 100);
+  assert_int_equal(pb_session_description(session)->mode, PB_LOCKSTEP);
+  pb_session_close(session);
+  e2e_daemon_end(&daemon);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(the_plant_runs_at_its_rate),
+      cmocka_unit_test(the_speed_is_a_factor),
+      cmocka_unit_test(a_stopped_client_loses_its_lease),
+      cmocka_unit_test(modes_may_change),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,183 @@
+// The ring between two threads, and the step thread: the same bits as steps taken by hand, no step
+// before its deadline, late inputs counted.
+#include <errno.h>
+#include <sched.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include <cmocka.h>
+
+#include "fpenv.h"
+#include "realtime.h"
+
+enum { RING_ITEMS = 50000, RING_CAPACITY = 64 };
+
+typedef struct item {
+  uint64_t number, check;
+} item;
+
+static void *ring_feed(void *context) {
+  pb_ring *ring = context;
+  for (uint64_t n = 0; n < RING_ITEMS;) {
+    const item next = {n, ~n};
+    if (pb_ring_put(ring, &next))
+      n++;
+    else
+      sched_yield();
+  }
+  return NULL;
+}
+
+static void a_ring_loses_and_reorders_nothing(void **state) {
+  (void)state;
+  static item slots[RING_CAPACITY];
+  pb_ring ring;
+  pb_ring_init(&ring, slots, sizeof slots[0], RING_CAPACITY);
+  pthread_t feeder;
+  assert_int_equal(pthread_create(&feeder, NULL, ring_feed, &ring), 0);
+  for (uint64_t n = 0; n < RING_ITEMS;) {
+    item got;
+    if (!pb_ring_take(&ring, &got)) {
+      sched_yield();
+      continue;
+    }
+    assert_int_equal(got.number, n);
+    assert_int_equal(got.check, ~n);
+    n++;
+  }
+  pthread_join(feeder, NULL);
+  item rest;
+  assert_false(pb_ring_take(&ring, &rest));
+}
+
+static void a_full_ring_refuses(void **state) {
+  (void)state;
+  static item slots[RING_CAPACITY];
+  pb_ring ring;
+  pb_ring_init(&ring, slots, sizeof slots[0], RING_CAPACITY);
+  const item one = {1, 2};
+  for (int i = 0; i < RING_CAPACITY; i++) assert_true(pb_ring_put(&ring, &one));
+  assert_false(pb_ring_put(&ring, &one));
+  item got;
+  assert_true(pb_ring_take(&ring, &got));
+  assert_true(pb_ring_put(&ring, &one));
+}
+
+typedef struct bench {
+  pb_model *model;
+  pb_stepper stepper;
+  pb_realtime *realtime;
+} bench;
+
+static int bench_open(void **state) {
+  bench *b = calloc(1, sizeof *b);
+  pb_error err = {PB_OK, "", ""};
+  assert_non_null(b);
+  b->realtime = calloc(1, sizeof *b->realtime);
+  assert_non_null(b->realtime);
+  if (pb_model_load(PB_TEST_DATA "/bus-bench.json", NULL, &b->model, &err))
+    fail_msg("%s", err.message);
+  assert_int_equal(pb_stepper_init(&b->stepper, b->model, &err), PB_OK);
+  assert_int_equal(pb_realtime_init(b->realtime, &b->stepper, &err), PB_OK);
+  *state = b;
+  return 0;
+}
+
+static int bench_close(void **state) {
+  bench *b = *state;
+  pb_realtime_free(b->realtime);
+  pb_stepper_free(&b->stepper);
+  pb_model_free(b->model);
+  free(b->realtime);
+  free(b);
+  return 0;
+}
+
+static pb_record record_next(bench *b) {
+  struct timespec until;
+  clock_gettime(CLOCK_REALTIME, &until);
+  until.tv_sec += 5;
+  while (sem_timedwait(&b->realtime->published, &until) != 0) assert_int_equal(errno, EINTR);
+  pb_record record;
+  assert_true(pb_ring_take(&b->realtime->records, &record));
+  return record;
+}
+
+static void records_equal_steps_by_hand(void **state) {
+  enum { STEPS = 400 };
+  bench *b = *state;
+  pb_error err;
+  const pb_realtime_options options = {.speed = 0.5, .cpu = -1};
+  const double u[2] = {3.0, -1.5};
+  double y[2];
+  pb_state *by_hand = pb_state_new(b->model);
+  assert_non_null(by_hand);
+  struct timespec begin, end;
+  clock_gettime(CLOCK_MONOTONIC, &begin);
+  assert_int_equal(pb_realtime_start(b->realtime, &options, u, &err), PB_OK);
+  const uint64_t saved = pb_flush_denormals();
+  for (uint64_t k = 1; k <= STEPS; k++) {
+    const pb_record record = record_next(b);
+    assert_int_equal(record.step, k);
+    assert_memory_equal(record.u, u, sizeof u);
+    pb_step_advance(b->model, by_hand, u);
+    pb_step_output(b->model, by_hand, y);
+    assert_memory_equal(record.y, y, sizeof y);
+  }
+  pb_restore_denormals(saved);
+  clock_gettime(CLOCK_MONOTONIC, &end);
+  pb_realtime_stop(b->realtime);
+  const double seconds =
+      (double)(end.tv_sec - begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec);
+  assert_true(seconds >= STEPS / (10000.0 * 0.5));  // no step is early
+  free(by_hand);
+}
+
+static void late_inputs_act_and_are_counted(void **state) {
+  bench *b = *state;
+  pb_error err;
+  const pb_realtime_options options = {.speed = 0.1, .cpu = -1};
+  const double u[2] = {0.0, 0.0};
+  assert_int_equal(pb_realtime_start(b->realtime, &options, u, &err), PB_OK);
+  while (record_next(b).step < 5) {
+  }
+  const pb_held_input input = {.for_step = 2, .u = {7.0, 0.0}};
+  assert_true(pb_realtime_input(b->realtime, &input));
+  pb_record record;
+  do record = record_next(b);
+  while (record.u[0] == 0.0 && record.step < 500);
+  pb_realtime_stop(b->realtime);
+  assert_true(record.u[0] == 7.0);
+  assert_true(record.flags & PB_FLAG_LATE);
+  assert_int_equal(atomic_load(&b->realtime->late), 1);
+}
+
+static void a_slow_plant_stops_at_once(void **state) {
+  bench *b = *state;
+  pb_error err;
+  const pb_realtime_options options = {.speed = 1e-5, .cpu = -1};  // a step each 10 s
+  const double u[2] = {0.0, 0.0};
+  struct timespec begin, end;
+  assert_int_equal(pb_realtime_start(b->realtime, &options, u, &err), PB_OK);
+  clock_gettime(CLOCK_MONOTONIC, &begin);
+  pb_realtime_stop(b->realtime);
+  clock_gettime(CLOCK_MONOTONIC, &end);
+  assert_true(end.tv_sec - begin.tv_sec < 3);
+  assert_int_equal(b->stepper.now.step, 0);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(a_ring_loses_and_reorders_nothing),
+      cmocka_unit_test(a_full_ring_refuses),
+      cmocka_unit_test_setup_teardown(records_equal_steps_by_hand, bench_open, bench_close),
+      cmocka_unit_test_setup_teardown(late_inputs_act_and_are_counted, bench_open, bench_close),
+      cmocka_unit_test_setup_teardown(a_slow_plant_stops_at_once, bench_open, bench_close),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
