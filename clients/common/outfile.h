@@ -1,0 +1,28 @@
+// Result files that appear whole or not at all: written beside their target, then renamed.
+//
+// A path that names something else than a regular file (/dev/stdout, a pipe) is written directly.
+#ifndef PB_CLIENTS_OUTFILE_H
+#define PB_CLIENTS_OUTFILE_H
+
+#include <stdbool.h>
+#include <stdio.h>
+
+#include "base/status.h"
+
+typedef struct pb_outfile {
+  char *path; // the target
+  char *temp; // what is written to; equal text to path when written directly
+  bool direct;
+} pb_outfile;
+
+// Creates the temporary file next to path. Fails with PB_ERR_IO (path, reason), PB_ERR_MEMORY.
+pb_status pb_outfile_create(const char *path, pb_outfile *out, pb_error *err);
+
+// Gives the file its name. Call with all streams on it closed. Fails with PB_ERR_IO; the temporary
+// file is then gone. *out is emptied either way.
+pb_status pb_outfile_commit(pb_outfile *out, pb_error *err);
+
+// Removes the temporary file; harmless on an empty *out.
+void pb_outfile_discard(pb_outfile *out);
+
+#endif

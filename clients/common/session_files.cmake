@@ -1,0 +1,8 @@
+# The session on the bus (session.h).
+set(PB_SESSION_SOURCES
+  session.c
+  session_attach.c
+  session_find.c
+  session_request.c
+  session_run.c
+)

@@ -1,0 +1,101 @@
+// Finding the plant on the bus and waiting for partners.
+#include <stdio.h>
+#include <string.h>
+
+#include "session_internal.h"
+
+static const int64_t settle_ns = 100000000;  // to hear of other plants, when none is named
+
+// Takes what is there; keeps the first that is wanted. *other: a second name was seen.
+static void descriptions_take(pb_session *s, dds_entity_t reader, const char *plant, char *other) {
+  for (;;) {
+    plantbus_PlantDescription *d = plantbus_PlantDescription__alloc();
+    if (!d) return;
+    memset(d, 0, sizeof *d);
+    void *sample[1] = {d};
+    dds_sample_info_t info;
+    const dds_return_t n = dds_take(reader, sample, &info, 1, 1);
+    if (n == 1 && info.valid_data && (!plant || strcmp(d->name, plant) == 0)) {
+      if (!s->received) {
+        s->received = d;
+        continue;
+      }
+      if (strcmp(d->name, s->received->name) != 0) snprintf(other, 65, "%s", d->name);
+    }
+    plantbus_PlantDescription_free(d, DDS_FREE_ALL);
+    if (n != 1) return;
+  }
+}
+
+static pb_status description_wait(pb_session *s, dds_entity_t reader, const char *plant,
+                                  pb_error *err) {
+  char other[65] = "";
+  int64_t deadline = pb_session_clock() + (int64_t)(s->timeout * 1e9);
+  const dds_entity_t waitset = dds_create_waitset(s->participant);
+  const dds_entity_t condition = dds_create_readcondition(reader, DDS_ANY_STATE);
+  dds_waitset_attach(waitset, condition, 0);
+  bool settling = false;
+  for (;;) {
+    const int64_t now = pb_session_clock();
+    if (now >= deadline) break;
+    dds_waitset_wait(waitset, NULL, 0, deadline - now);
+    descriptions_take(s, reader, plant, other);
+    if (!s->received) continue;
+    if (plant || other[0]) break;
+    if (!settling) deadline = pb_session_clock() + settle_ns;
+    settling = true;
+  }
+  dds_delete(waitset);
+  dds_delete(condition);
+  if (!s->received)
+    return pb_fail(err, PB_ERR_STATE, plant ? plant : "plant",
+                   "no daemon serves it on domain %u (waited %g s)", s->domain, s->timeout);
+  if (other[0])
+    return pb_fail(err, PB_ERR_STATE, "plant", "'%s' and '%s' are served on domain %u: name one",
+                   s->received->name, other, s->domain);
+  return PB_OK;
+}
+
+pb_status pb_session_find(pb_session *s, const char *plant, pb_error *err) {
+  const dds_entity_t subscriber = pb_partition_create(s->participant, plant ? plant : "*", false);
+  if (subscriber < 0) return pb_fail(err, PB_ERR_IO, "DDS", "%s", dds_strretcode(-subscriber));
+  const dds_entity_t reader =
+      pb_reader_create(subscriber, s->topic[PB_TOPIC_DESCRIPTION], PB_TOPIC_DESCRIPTION, 0, NULL);
+  pb_status status = reader < 0 ? pb_fail(err, PB_ERR_IO, "DDS", "%s", dds_strretcode(-reader))
+                                : description_wait(s, reader, plant, err);
+  dds_delete(subscriber);
+  return status;
+}
+
+static uint32_t partners(dds_entity_t entity, bool writer) {
+  dds_publication_matched_status_t p = {0};
+  dds_subscription_matched_status_t q = {0};
+  if (writer) {
+    dds_get_publication_matched_status(entity, &p);
+    return p.current_count;
+  }
+  dds_get_subscription_matched_status(entity, &q);
+  return q.current_count;
+}
+
+pb_status pb_session_match(pb_session *s, dds_entity_t entity, bool writer, bool only,
+                           int64_t deadline, pb_error *err) {
+  const dds_entity_t waitset = dds_create_waitset(s->participant);
+  dds_set_status_mask(entity,
+                      writer ? DDS_PUBLICATION_MATCHED_STATUS : DDS_SUBSCRIPTION_MATCHED_STATUS);
+  dds_waitset_attach(waitset, entity, 0);
+  uint32_t count;
+  for (;;) {
+    count = partners(entity, writer);
+    const int64_t now = pb_session_clock();
+    if (count > 0 || now >= deadline) break;
+    dds_waitset_wait(waitset, NULL, 0, deadline - now);
+  }
+  dds_delete(waitset);
+  if (count == 0)
+    return pb_fail(err, PB_ERR_STATE, s->received->name, "the daemon does not answer on the bus");
+  if (count > 1 && only)
+    return pb_fail(err, PB_ERR_STATE, s->received->name, "%u daemons serve a plant of this name",
+                   count);
+  return PB_OK;
+}

@@ -1,0 +1,9 @@
+# What the tools share (clients/common).
+pb_test(client_options LABELS unit SOURCES test_options.c LIBS plantbus_client_common)
+pb_test(client_table LABELS unit SOURCES test_table.c LIBS plantbus_client_common)
+pb_test(client_result_files LABELS unit SOURCES test_result_files.c
+        LIBS plantbus_client_common PkgConfig::MATIO)
+pb_test(client_plot LABELS unit SOURCES test_plot.c LIBS plantbus_client_common)
+
+# Transmission zeros (src/model/zeros).
+pb_test(unit_zeros LABELS unit SOURCES test_zeros.c)

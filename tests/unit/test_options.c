@@ -1,0 +1,168 @@
+// Strict values of flags, exit codes of wrong command lines, the form of messages.
+#include "options.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static void test_double(void **state) {
+  (void)state;
+  double value = 0;
+  assert_true(pb_parse_double("-1.5e-3", &value));
+  assert_true(value == -1.5e-3);
+  assert_true(pb_parse_double("0.1", &value));
+  assert_true(value == 0.1);
+  static const char *const wrong[] = {"",      " 1", "1 ", "1,5",   "0x10", "nan", "inf",
+                                      "1e999", "1e", "-",  "1.2.3", "--1",  "1m"};
+  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+    value = 7;
+    if (pb_parse_double(wrong[i], &value) || value != 7) fail_msg("'%s' was taken", wrong[i]);
+  }
+}
+
+static void test_uint64(void **state) {
+  (void)state;
+  uint64_t value = 0;
+  assert_true(pb_parse_uint64("18446744073709551615", &value));
+  assert_true(value == UINT64_MAX);
+  assert_false(pb_parse_uint64("18446744073709551616", &value));
+  assert_false(pb_parse_uint64("-1", &value));
+  assert_false(pb_parse_uint64("", &value));
+  assert_false(pb_parse_uint64("1.0", &value));
+}
+
+static void test_lists(void **state) {
+  (void)state;
+  double *value;
+  size_t count;
+  assert_true(pb_parse_double_list("1,2.5,-3e2", &value, &count));
+  assert_int_equal(count, 3);
+  assert_true(value[0] == 1 && value[1] == 2.5 && value[2] == -300);
+  free(value);
+  assert_false(pb_parse_double_list("1,,2", &value, &count));
+  assert_null(value);
+  assert_int_equal(count, 0);
+  assert_false(pb_parse_double_list("1,2,", &value, &count));
+  assert_false(pb_parse_double_list("", &value, &count));
+  pb_name_list names = {0};
+  assert_true(pb_parse_names("Va1,Va2", &names));
+  assert_true(pb_parse_names("Fz", &names));
+  assert_int_equal(names.count, 3);
+  assert_string_equal(names.name[1], "Va2");
+  assert_string_equal(names.name[2], "Fz");
+  assert_false(pb_parse_names("a,,b", &names));
+  pb_name_list_free(&names);
+  assert_int_equal(names.count, 0);
+}
+
+// ---- a small tool, run in a child process ------------------------------------------------------
+
+typedef struct tool {
+  pb_common_options common;
+  double gain;
+} tool;
+
+static error_t parse_tool(int key, char *arg, struct argp_state *state) {
+  tool *t = state->input;
+  switch (key) {
+  case ARGP_KEY_INIT:
+    state->child_inputs[0] = &t->common;
+    return 0;
+  case 'g':
+    t->gain = pb_option_double(state, "--gain", arg, 0, 100);
+    return 0;
+  default:
+    return ARGP_ERR_UNKNOWN;
+  }
+}
+
+static const struct argp_option tool_option[] = {{"gain", 'g', "G", 0, "gain", 0}, {0}};
+static const struct argp_child tool_child[] = {{&pb_common_argp, 0, NULL, 0}, {0}};
+static const struct argp tool_argp = {
+    .options = tool_option, .parser = parse_tool, .children = tool_child};
+
+// Parses in a child; returns its exit code (10 when parsing came to an end) and what it wrote.
+static int run_tool(char **argv, tool *expected, char *text, size_t size) {
+  int pipes[2];
+  assert_int_equal(pipe(pipes), 0);
+  int argc = 0;
+  while (argv[argc]) argc++;
+  pid_t pid = fork();
+  if (pid == 0) {
+    dup2(pipes[1], STDERR_FILENO);
+    tool t = {.gain = 1};
+    error_t failure = pb_options_parse(&tool_argp, argc, argv, &t);
+    bool same = t.gain == expected->gain && t.common.domain == expected->common.domain &&
+                !strcmp(t.common.plant ? t.common.plant : "",
+                        expected->common.plant ? expected->common.plant : "");
+    _exit(failure || !same ? 11 : 10);
+  }
+  close(pipes[1]);
+  size_t used = 0;
+  ssize_t got;
+  while ((got = read(pipes[0], text + used, size - 1 - used)) > 0) used += (size_t)got;
+  text[used] = 0;
+  close(pipes[0]);
+  int result = 0;
+  waitpid(pid, &result, 0);
+  return WIFEXITED(result) ? WEXITSTATUS(result) : -1;
+}
+
+static void test_command_line(void **state) {
+  (void)state;
+  char text[1024];
+  tool expected = {.gain = 2.5, .common = {.domain = 7, .plant = "bench"}};
+  char *good[] = {"tool", "--gain", "2.5", "--domain", "7", "--plant=bench", NULL};
+  assert_int_equal(run_tool(good, &expected, text, sizeof text), 10);
+  assert_string_equal(text, "");
+  char *word[] = {"tool", "--gain", "much", NULL};
+  assert_int_equal(run_tool(word, &expected, text, sizeof text), PB_EXIT_USAGE);
+  assert_non_null(strstr(text, "--gain: 'much' is not a number"));
+  char *range[] = {"tool", "--gain", "101", NULL};
+  assert_int_equal(run_tool(range, &expected, text, sizeof text), PB_EXIT_USAGE);
+  assert_non_null(strstr(text, "--gain: 101 is out of range, expected 0 to 100"));
+  char *domain[] = {"tool", "--domain", "-1", NULL};
+  assert_int_equal(run_tool(domain, &expected, text, sizeof text), PB_EXIT_USAGE);
+  assert_non_null(strstr(text, "--domain"));
+  char *unknown[] = {"tool", "--nothing", NULL};
+  assert_int_equal(run_tool(unknown, &expected, text, sizeof text), PB_EXIT_USAGE);
+}
+
+static void test_messages(void **state) {
+  (void)state;
+  char *text = NULL;
+  size_t size = 0;
+  FILE *stream = open_memstream(&text, &size);
+  pb_error err = {PB_ERR_SCHEMA, "/components/apa/k_1", "expected a positive number"};
+  pb_print_error(stream, &err);
+  pb_error bare = {PB_ERR_IO, "", ""};
+  pb_print_error(stream, &bare);
+  pb_warnings warnings = {0};
+  assert_int_equal(pb_warn(&warnings, NULL, "a.mat", "%d digits", 4), PB_OK);
+  pb_print_warnings(stream, &warnings);
+  pb_warnings_clear(&warnings);
+  fclose(stream);
+  char expected[512];
+  const char *me = program_invocation_short_name;
+  snprintf(expected, sizeof expected,
+           "%s: /components/apa/k_1: expected a positive number\n"
+           "%s: a file cannot be read or written\n%s: warning: a.mat: 4 digits\n",
+           me, me, me);
+  assert_string_equal(text, expected);
+  free(text);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_double),   cmocka_unit_test(test_uint64),
+      cmocka_unit_test(test_lists),    cmocka_unit_test(test_command_line),
+      cmocka_unit_test(test_messages),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
