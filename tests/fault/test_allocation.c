@@ -1,0 +1,146 @@
+// Every allocation of loading, assembling and compiling a plant fails once: each time the call reports
+// it, hands nothing out and leaks nothing (the sanitizers' build sees to the latter).
+#include "support/beam.h"
+#include "support/check.h"
+
+#include "assembly/system.h"
+#include "base/json.h"
+#include "base/text.h"
+#include "model/model.h"
+
+void *__real_malloc(size_t size);
+void *__real_calloc(size_t count, size_t size);
+void *__real_realloc(void *p, size_t size);
+
+static long allocations, failing;  // failing: the number of the allocation that fails; 0: none
+
+static bool fails(void) { return ++allocations == failing; }
+
+void *__wrap_malloc(size_t size) { return fails() ? NULL : __real_malloc(size); }
+void *__wrap_calloc(size_t count, size_t size) {
+  return fails() ? NULL : __real_calloc(count, size);
+}
+void *__wrap_realloc(void *p, size_t size) { return fails() ? NULL : __real_realloc(p, size); }
+
+typedef pb_status (*subject)(const char *input, pb_error *err);
+
+// Runs the subject failing allocation 1, 2, … until it succeeds without one failing.
+static void fail_each(subject call, const char *input, const char *name) {
+  for (failing = 1;; failing++) {
+    pb_error err = {0};
+    allocations = 0;
+    pb_status st = call(input, &err);
+    bool reached = allocations >= failing;
+    if (!st && reached) {
+      failing = 0;
+      fail_msg("%s: allocation %ld failed and nobody noticed", name, allocations);
+    }
+    if (st && !reached) {
+      failing = 0;
+      fail_msg("%s: failed by itself: %s: %s", name, err.where, err.message);
+    }
+    if (st && !err.message[0]) fail_msg("%s: a failure without a message", name);
+    if (!st) break;
+  }
+  print_message("%s: %ld allocations failed in turn\n", name, failing - 1);
+  assert_true(failing > 20);
+  failing = 0;
+}
+
+static pb_status load(const char *path, pb_error *err) {
+  pb_warnings warnings = {0};
+  pb_model *model = NULL;
+  pb_status st = pb_model_load(path, &warnings, &model, err);
+  if (st && model) fail_msg("a model was handed out in spite of %s", err->message);
+  pb_model_free(model);
+  pb_warnings_clear(&warnings);
+  return st;
+}
+
+static pb_status pack_and_truncate(const char *path, pb_error *err) {
+  static pb_model *model, *copy;
+  double *data = NULL;
+  size_t count;
+  (void)path;
+  if (!model) {
+    long kept = failing;
+    failing = 0;
+    pb_status st = pb_model_load(PB_CONFIG "/plants/apa300ml-bench.json", NULL, &model, err);
+    failing = kept, allocations = 0;
+    if (st) return st;
+  }
+  const char *in[] = {"a", "b"}, *unit[] = {"V", "N"};
+  pb_status st = pb_model_pack(model, &data, &count, err);
+  if (!st) st = pb_model_unpack(data, count, "copy", in, unit, in, unit, &copy, err);
+  if (!st) pb_model_free(copy);
+  if (!st) st = pb_model_truncate(model, 1000, &copy, err);
+  if (!st) pb_model_free(copy);
+  free(data);
+  if (!st) {
+    pb_model_free(model);
+    model = NULL;
+  }
+  return st;
+}
+
+static void test_bench(void **state) {
+  (void)state;
+  fail_each(load, PB_CONFIG "/plants/apa300ml-bench.json", "apa300ml-bench");
+}
+
+static void test_hexapod(void **state) {
+  (void)state;
+  fail_each(load, PB_CONFIG "/plants/nano-hexapod.json", "nano-hexapod");
+}
+
+// An element as component and as joint, a massless body, damping of both kinds.
+static void test_elements(void **state) {
+  (void)state;
+  static const beam steel = {.length = 0.1, .ea = 2e7, .ei = 50, .gj = 40, .mass = 0.08,
+                             .polar_inertia = 2e-6};
+  static const char *const text =
+      "{\"schema\": \"plantbus.plant/1\", \"name\": \"t\", \"models\": {\"e\": {\"type\": "
+      "\"super_element\", \"file\": \"pb-fault.mat\", \"modal_damping\": 0.01}}, \"components\": "
+      "{\"beam\": {\"model\": \"e\", \"rayleigh\": {\"alpha\": 1, \"beta\": 1e-6}, \"frames\": "
+      "{\"tip\": {\"node\": 2, \"offset\": [0, 0, 0.01]}}, \"stacks\": {\"actuator\": {\"frames\": "
+      "[\"1\", \"2\"], \"axis\": [0, 0, 1]}}, \"g_a\": 1, \"ends\": [1, 2]}, \"a\": {\"type\": "
+      "\"rigid_body\", \"mass\": 1, \"inertia\": [1, 1, 1], \"position\": [0, 0, 0.21]}, \"b\": "
+      "{\"type\": \"rigid_body\", \"mass\": 0, \"inertia\": [0, 0, 0], \"position\": [0, 0, 0.21]}}, "
+      "\"connections\": {\"w\": {\"from\": \"ground\", \"to\": \"beam.1\", \"joint\": {\"type\": "
+      "\"weld\"}}, \"j\": {\"from\": \"beam.tip\", \"to\": \"a\", \"joint\": {\"model\": \"e\", \"nodes\": [1, 2]}}, \"k\": "
+      "{\"from\": \"a\", \"to\": \"b\", \"joint\": {\"type\": \"prismatic\", \"k_a\": 5}}}, "
+      "\"inputs\": [{\"name\": \"V\", \"type\": \"actuator_voltage\", \"component\": \"beam\"}], "
+      "\"outputs\": [{\"name\": \"x\", \"type\": \"acceleration\", \"frame\": \"b\", "
+      "\"direction\": [1, 0, 0]}]}";
+  double k[144], m[144], position[6];
+  char directory[] = "/tmp/pb-fault-XXXXXX", plant[64], element[64];
+  assert_non_null(mkdtemp(directory));
+  snprintf(plant, sizeof plant, "%s/plant.json", directory);
+  snprintf(element, sizeof element, "%s/pb-fault.mat", directory);
+  beam_matrices(&steel, k, m, position);
+  position[2] = 0, position[5] = 0.1;
+  assert_int_equal(beam_write(element, 2, 12, k, m, position), 0);
+  FILE *file = fopen(plant, "w");
+  assert_non_null(file);
+  fputs(text, file);
+  fclose(file);
+  fail_each(load, plant, "elements");
+  unlink(plant), unlink(element), rmdir(directory);
+}
+
+static void test_pack_and_truncate(void **state) {
+  (void)state;
+  fail_each(pack_and_truncate, NULL, "pack and truncate");
+}
+
+int main(void) {
+  cJSON_Hooks hooks = {__wrap_malloc, free};
+  cJSON_InitHooks(&hooks);
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_bench),
+      cmocka_unit_test(test_hexapod),
+      cmocka_unit_test(test_elements),
+      cmocka_unit_test(test_pack_and_truncate),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
