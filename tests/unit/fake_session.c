@@ -36,7 +36,9 @@ void fake_session_free(pb_session *s) {
   free(s);
 }
 
-const pb_model *pb_session_model(const pb_session *s) { return s->model; }
+const pb_model *pb_session_model(const pb_session *s) {
+  return s->model;
+}
 
 pb_status pb_session_attach(pb_session *s, const pb_attach_options *o, pb_error *err) {
   s->inputs = o->input_count;

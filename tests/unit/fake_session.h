@@ -1,4 +1,5 @@
-// A session without a bus: the plant is stepped in the calling thread. For tests of the tools' logic.
+// A session without a bus: the plant is stepped in the calling thread. For tests of the tools'
+// logic.
 #ifndef TESTS_FAKE_SESSION_H
 #define TESTS_FAKE_SESSION_H
 

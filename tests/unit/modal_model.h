@@ -14,8 +14,8 @@
 
 typedef struct test_mode {
   double hz, damping;
-  const double *in;  // [nu]
-  const double *out; // [ny]
+  const double *in;   // [nu]
+  const double *out;  // [ny]
 } test_mode;
 
 static inline pb_model *test_model(const test_mode *mode, size_t modes, size_t nu, size_t ny,

@@ -94,7 +94,7 @@ static void test_noise(void **state) {
   assert_memory_equal(u, v, N * NU * sizeof *u);
   double product = 0;
   for (int k = 0; k < N; k++) product += u[k * NU] * u[k * NU + 1] / N;
-  assert_true(fabs(product) < 0.01); // independent inputs: 1/sqrt(900 lines) of 0.09
+  assert_true(fabs(product) < 0.01);  // independent inputs: 1/sqrt(900 lines) of 0.09
   for (size_t i = 0; i < NU; i++) {
     assert_true(fabs(rms_of(u, N, NU, i) - 0.3) < 1e-14);
     assert_true(power_outside(u, N, NU, i, 10000, 50, 500) < 1e-24);
@@ -102,7 +102,7 @@ static void test_noise(void **state) {
   spec.periodic = false;
   assert_int_equal(pb_excite_noise(&spec, N, NU, u, NULL), PB_OK);
   assert_true(fabs(rms_of(u, N, NU, 1) - 0.3) < 1e-14);
-  assert_true(power_outside(u, N, NU, 0, 10000, 50, 500) < 1e-2); // the seam leaks
+  assert_true(power_outside(u, N, NU, 0, 10000, 50, 500) < 1e-2);  // the seam leaks
   spec.seed = 4;
   assert_int_equal(pb_excite_noise(&spec, N, NU, v, NULL), PB_OK);
   assert_memory_not_equal(u, v, N * NU * sizeof *u);

@@ -71,7 +71,8 @@ static double largest_error(const pb_frf *frf, const double complex *h) {
   double worst = 0;
   for (size_t f = 0; f < frf->nf; f++) {
     for (size_t o = 0; o < frf->ny; o++) {
-      const double complex *a = frf->h + (f * frf->ny + o) * frf->nu, *b = h + (f * frf->ny + o) * frf->nu;
+      const double complex *a = frf->h + (f * frf->ny + o) * frf->nu,
+                           *b = h + (f * frf->ny + o) * frf->nu;
       double row = 0, error = 0;
       for (size_t i = 0; i < frf->nu; i++) {
         row = fmax(row, cabs(b[i]));
@@ -209,7 +210,8 @@ static void test_divergence(void **state) {
   // The last command was zero on both inputs.
   double command[2] = {1, 1};
   double y[3] = {0}, u[2] = {0};
-  pb_sample sample = {.step = t->limit_step + 1, .input_count = 2, .output_count = 3, .input = u, .output = y};
+  pb_sample sample = {
+      .step = t->limit_step + 1, .input_count = 2, .output_count = 3, .input = u, .output = y};
   assert_false(pb_experiment_on_sample(e, &sample, command));
   pb_experiment_free(e);
   fake_session_free(session);
@@ -256,12 +258,15 @@ static void test_refusals(void **state) {
   pb_error err;
   pb_experiment_options options = standard(PB_EXCITE_MULTISINE);
   options.averages = 1;
-  assert_int_equal(pb_experiment_new(m, &channels, NULL, &options, false, &e, &err), PB_ERR_ARGUMENT);
+  assert_int_equal(pb_experiment_new(m, &channels, NULL, &options, false, &e, &err),
+                   PB_ERR_ARGUMENT);
   options = standard(PB_EXCITE_MULTISINE);
   options.resolution = 1e-6;
-  assert_int_equal(pb_experiment_new(m, &channels, NULL, &options, false, &e, &err), PB_ERR_ARGUMENT);
+  assert_int_equal(pb_experiment_new(m, &channels, NULL, &options, false, &e, &err),
+                   PB_ERR_ARGUMENT);
   options.resolution = NAN;
-  assert_int_equal(pb_experiment_new(m, &channels, NULL, &options, false, &e, &err), PB_ERR_ARGUMENT);
+  assert_int_equal(pb_experiment_new(m, &channels, NULL, &options, false, &e, &err),
+                   PB_ERR_ARGUMENT);
   assert_null(e);
   pb_model_free(m);
 }

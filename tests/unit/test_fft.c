@@ -45,7 +45,7 @@ static void check_length(size_t n) {
   pb_fft_inverse(&fft, X, back);
   pb_fft_forward(&fft, x, x);
   for (size_t k = 0; k < n; k++) {
-    assert_true(x[k] == X[k]); // in place gives the same bits
+    assert_true(x[k] == X[k]);  // in place gives the same bits
   }
   pb_fft_inverse(&fft, x, x);
   for (size_t k = 0; k < n; k++) assert_true(x[k] == back[k]);

@@ -33,7 +33,7 @@ static pb_model *large_plant(void) {
     }
     for (size_t j = 0; j < 2; j++) {
       if (k == 5) shape[k][j] = 0;
-      shape[k][NU + j] = 100 * shape[k][j]; // collocated: positive integral feedback damps
+      shape[k][NU + j] = 100 * shape[k][j];  // collocated: positive integral feedback damps
     }
     mode[k] = (test_mode){hz, 0.002 + 0.0001 * (double)(k % 9), shape[k], shape[k] + NU};
   }

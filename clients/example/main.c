@@ -1,0 +1,66 @@
+// plantbus-example: a controller of your own in one page. Integral force feedback on one actuator:
+//   u(k) = (1 − ε) u(k−1) + g T y(k)        an integrator that forgets slow offsets (ε = 2π·2 Hz · T)
+// Usage: plantbus-example INPUT OUTPUT GAIN SECONDS [DOMAIN]
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "session.h"
+
+typedef struct controller {
+  int output;  // index of y in a sample
+  double u, keep, gain, peak;
+  uint64_t steps;
+} controller;
+
+// Answers one sample with one command. Runs in a DDS thread: no printing, no waiting.
+static bool on_sample(void *context, const pb_sample *sample, double *command) {
+  controller *c = context;
+  double y = sample->output[c->output];
+  if (c->steps-- == 0) return false;
+  c->u = c->keep * c->u + c->gain * y;
+  command[0] = c->u;
+  if (y > c->peak) c->peak = y;
+  return true;
+}
+
+static int fail(const pb_error *err) {
+  char text[900];
+  pb_error_format(err, text, sizeof text);
+  fprintf(stderr, "plantbus-example: %s\n", text);
+  return 1;
+}
+
+int main(int argc, char **argv) {
+  if (argc < 5) {
+    fprintf(stderr, "usage: plantbus-example INPUT OUTPUT GAIN SECONDS [DOMAIN]\n");
+    return 2;
+  }
+  pb_error err = {0};
+  pb_session *session = NULL;
+  pb_session_options where = {.domain = argc > 5 ? (uint32_t)atoi(argv[5]) : 0};
+  if (pb_session_open(&where, &session, &err)) return fail(&err);
+
+  const pb_model *model = pb_session_model(session);
+  double dt = 1 / model->sample_rate;
+  controller c = {.output = pb_model_output(model, argv[2]),
+                  .keep = 1 - 2 * 3.14159265 * 2 * dt,
+                  .gain = atof(argv[3]) * dt,
+                  .steps = (uint64_t)(atof(argv[4]) * model->sample_rate)};
+  if (c.output < 0) {
+    fprintf(stderr, "plantbus-example: the plant has no output \"%s\"\n", argv[2]);
+    pb_session_close(session);
+    return 1;
+  }
+  const char *inputs[] = {argv[1]};
+  pb_attach_options attach = {
+      .channel = "example", .inputs = inputs, .input_count = 1, .barrier = true};
+  pb_run_options run = {.on_sample = on_sample, .context = &c, .stall = 5};
+  pb_run_report report;
+  pb_status status = pb_session_attach(session, &attach, &err);
+  if (!status) status = pb_session_run(session, &run, &report, &err);
+  pb_session_close(session);
+  if (status) return fail(&err);
+  printf("%llu steps in %.2f s, largest %s %g\n", (unsigned long long)report.samples,
+         report.seconds, argv[2], c.peak);
+  return 0;
+}

@@ -1,0 +1,53 @@
+#!/bin/sh
+# Installs what is missing, builds, serves the APA300ML bench (2-DoF actuator, 5 kg) on the bus of this
+# host, identifies it, damps it by integral force feedback, and leaves plots and data in out/.
+# Usage: ./demo.sh [--plant FILE]
+set -eu
+cd "$(dirname "$0")"
+
+plant=config/plants/apa300ml-bench.json
+while [ $# -gt 0 ]; do
+  case "$1" in
+  --plant)
+    [ $# -ge 2 ] || { echo "demo.sh: --plant needs a file" >&2; exit 2; }
+    plant=$2
+    shift 2
+    ;;
+  *)
+    echo "usage: ./demo.sh [--plant FILE]" >&2
+    exit 2
+    ;;
+  esac
+done
+[ -r "$plant" ] || { echo "demo.sh: cannot read $plant" >&2; exit 1; }
+
+scripts/install.sh
+[ -f build/build.ninja ] || cmake --preset release >/dev/null
+cmake --build --preset release
+
+# A domain of its own, so that another plant on this host is not in the way.
+domain=$((100 + $$ % 100))
+mkdir -p out
+daemon=""
+stop() {
+  [ -z "$daemon" ] || kill "$daemon" 2>/dev/null || true
+  [ -z "$daemon" ] || wait "$daemon" 2>/dev/null || true
+  daemon=""
+}
+trap stop EXIT
+trap 'exit 130' INT
+trap 'exit 143' TERM
+
+echo
+build/bin/plantbusd --plant "$plant" --domain $domain &
+daemon=$!
+echo "== identification: band-limited noise over the bus"
+build/bin/plantbus-identify --domain $domain --excitation noise --band 5,500 --resolution 0.25 \
+  --averages 12 --plot -o out
+echo
+echo "== integral force feedback, at the gain with the most damping"
+build/bin/plantbus-iff --domain $domain --gain auto --plot -o out
+echo
+stop
+echo "plots and data are in out/:"
+ls out
