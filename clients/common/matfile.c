@@ -1,91 +1,46 @@
-// MAT v5 files: see matfile.h.
+// MAT v5 files by way of matio: see matfile.h.
 //
-// Written here and not by a library so that a full disk is noticed: matio patches each element's
-// size to what reached the file, and says nothing. Format: MathWorks, "MAT-File Format", level 5: a
-// header of 128 bytes, then one miMATRIX element a variable, made of flags, dimensions, name and
-// data; every element is a type, a size and its bytes, padded to a multiple of eight. Byte order:
-// this machine's.
+// matio does not tell when a write fails (it patches the size of each element to what reached the
+// file), so the bytes that the variables need are counted and the file is measured at the end.
 #include "matfile.h"
 
 #include <ctype.h>
-#include <errno.h>
+#include <matio.h>
 #include <stdbool.h>
 #include <stdint.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "outfile.h"
 
-enum { MI_INT8 = 1, MI_INT32 = 5, MI_UINT32 = 6, MI_DOUBLE = 9, MI_MATRIX = 14, MI_UTF8 = 16 };
-enum { MX_CELL = 1, MX_CHAR = 4, MX_DOUBLE = 6, COMPLEX = 0x0800 };
-
 struct pb_matfile {
   pb_outfile file;
-  FILE *stream;
-  pb_error error; // the first failure; code PB_OK: none
+  mat_t *mat;
+  size_t needed;   // bytes of data handed to matio, at least
+  pb_error error;  // the first failure; code PB_OK: none
 };
+
+enum { HEADER = 128 };
 
 pb_status pb_matfile_open(const char *path, pb_matfile **out, pb_error *err) {
   *out = NULL;
   pb_matfile *made = calloc(1, sizeof *made);
   if (!made) return pb_fail_memory(err, path);
+  made->needed = HEADER;
   pb_status status = pb_outfile_create(path, &made->file, err);
   if (!status) {
-    made->stream = fopen(made->file.temp, "wb");
-    if (!made->stream) {
-      status = pb_fail(err, PB_ERR_IO, path, "cannot be written: %s", strerror(errno));
-    }
+    // A header of our own has no date in it: the same data give the same bytes.
+    made->mat = Mat_CreateVer(made->file.temp, "MATLAB 5.0 MAT-file, created by plantbus " PB_VERSION,
+                              MAT_FT_MAT5);
+    if (!made->mat) status = pb_fail(err, PB_ERR_IO, path, "cannot be written");
   }
   if (status) {
     pb_matfile_discard(made);
     return status;
   }
-  // No date: the same data gives the same bytes.
-  const uint16_t version[2] = {0x0100, 'M' << 8 | 'I'};
-  fprintf(made->stream, "%-116.116s%8s", "MATLAB 5.0 MAT-file, created by plantbus " PB_VERSION,
-          "");
-  fwrite(version, sizeof version, 1, made->stream);
   *out = made;
   return PB_OK;
-}
-
-// ---- elements -----------------------------------------------------------------------------------
-
-static size_t padded(size_t bytes) {
-  return (bytes + 7) / 8 * 8;
-}
-
-static void put_tag(FILE *stream, uint32_t type, size_t bytes) {
-  const uint32_t tag[2] = {type, (uint32_t)bytes};
-  fwrite(tag, sizeof tag, 1, stream);
-}
-
-static void put_padding(FILE *stream, size_t bytes) {
-  static const char zeros[8];
-  fwrite(zeros, 1, padded(bytes) - bytes, stream);
-}
-
-static void put_element(FILE *stream, uint32_t type, const void *data, size_t bytes) {
-  put_tag(stream, type, bytes);
-  if (bytes) fwrite(data, 1, bytes, stream);
-  put_padding(stream, bytes);
-}
-
-// Bytes of a matrix element after its tag, for `data` bytes of data elements with their tags.
-static size_t matrix_size(const char *name, int rank, size_t data) {
-  return 16 + 8 + padded(4 * (size_t)rank) + 8 + padded(strlen(name)) + data;
-}
-
-static void put_matrix_head(FILE *stream, const char *name, uint32_t flags, int rank,
-                            const size_t *dims, size_t data) {
-  const uint32_t array_flags[2] = {flags, 0};
-  int32_t size[3];
-  for (int i = 0; i < rank; i++) size[i] = (int32_t)dims[i];
-  put_tag(stream, MI_MATRIX, matrix_size(name, rank, data));
-  put_element(stream, MI_UINT32, array_flags, sizeof array_flags);
-  put_element(stream, MI_INT32, size, 4 * (size_t)rank);
-  put_element(stream, MI_INT8, name, strlen(name));
 }
 
 static bool is_identifier(const char *name) {
@@ -108,14 +63,21 @@ static bool may_write(pb_matfile *mat, const char *name, size_t bytes) {
   return mat->error.code == PB_OK;
 }
 
+// Writes the variable (NULL: it could not be made) and frees it. data: bytes of its numbers.
+static void put(pb_matfile *mat, matvar_t *v, const char *name, size_t data) {
+  if (!v) {
+    pb_fail_memory(&mat->error, mat->file.path);
+  } else if (Mat_VarWrite(mat->mat, v, MAT_COMPRESSION_NONE)) {
+    pb_fail(&mat->error, PB_ERR_IO, mat->file.path, "variable '%s' cannot be written", name);
+  }
+  mat->needed += data;
+  Mat_VarFree(v);
+}
+
 // ---- numbers ------------------------------------------------------------------------------------
 
-static void put_real(pb_matfile *mat, const char *name, int rank, const size_t *dims, size_t count,
-                     const double *data) {
-  if (!may_write(mat, name, 8 * count)) return;
-  put_matrix_head(mat->stream, name, MX_DOUBLE, rank, dims, 8 + 8 * count);
-  put_element(mat->stream, MI_DOUBLE, data, 8 * count);
-}
+// Tags, flags, sizes and a name of at least one character: what matio writes before the numbers.
+enum { MATRIX_HEAD = 8 + 16 + 16 + 8 + 8 };
 
 void pb_matfile_scalar(pb_matfile *mat, const char *name, double value) {
   pb_matfile_real(mat, name, 1, 1, &value);
@@ -123,33 +85,56 @@ void pb_matfile_scalar(pb_matfile *mat, const char *name, double value) {
 
 void pb_matfile_real(pb_matfile *mat, const char *name, size_t rows, size_t cols,
                      const double *data) {
-  const size_t dims[2] = {rows, cols};
-  put_real(mat, name, 2, dims, rows * cols, data);
+  size_t dims[2] = {rows, cols}, bytes = 8 * rows * cols;
+  if (!may_write(mat, name, bytes)) return;
+  double none = 0;
+  matvar_t *v = Mat_VarCreate(name, MAT_C_DOUBLE, MAT_T_DOUBLE, 2, dims,
+                              data ? (void *)data : &none, 0);
+  put(mat, v, name, MATRIX_HEAD + bytes);
+}
+
+// Splits `count` complex numbers, the k-th at index order(k), into the two arrays that matio wants.
+static void put_complex(pb_matfile *mat, const char *name, int rank, size_t *dims, size_t count,
+                        const double complex *data, size_t (*order)(size_t, const size_t *)) {
+  if (!may_write(mat, name, 16 * count)) return;
+  double *part = malloc((2 * count + 1) * sizeof *part);
+  if (!part) {
+    pb_fail_memory(&mat->error, mat->file.path);
+    return;
+  }
+  for (size_t k = 0; k < count; k++) {
+    double complex value = data[order(k, dims)];
+    part[k] = creal(value);
+    part[count + k] = cimag(value);
+  }
+  mat_complex_split_t split = {part, part + count};
+  matvar_t *v =
+      Mat_VarCreate(name, MAT_C_DOUBLE, MAT_T_DOUBLE, rank, dims, &split, MAT_F_COMPLEX);
+  put(mat, v, name, MATRIX_HEAD + 8 + 16 * count);
+  free(part);
+}
+
+static size_t same_order(size_t k, const size_t *dims) {
+  (void)dims;
+  return k;
+}
+
+// From [ny][nu][nf], first index fastest, to [nf][ny][nu], last index fastest.
+static size_t response_order(size_t k, const size_t *dims) {
+  size_t ny = dims[0], nu = dims[1], o = k % ny, i = k / ny % nu, f = k / ny / nu;
+  return (f * ny + o) * nu + i;
 }
 
 void pb_matfile_complex(pb_matfile *mat, const char *name, size_t rows, size_t cols,
                         const double complex *data) {
-  const size_t count = rows * cols, dims[2] = {rows, cols};
-  if (!may_write(mat, name, 16 * count)) return;
-  put_matrix_head(mat->stream, name, MX_DOUBLE | COMPLEX, 2, dims, 16 + 16 * count);
-  for (int part = 0; part < 2; part++) {
-    put_tag(mat->stream, MI_DOUBLE, 8 * count);
-    for (size_t i = 0; i < count; i++) fwrite((const double *)&data[i] + part, 8, 1, mat->stream);
-  }
+  size_t dims[2] = {rows, cols};
+  put_complex(mat, name, 2, dims, rows * cols, data, same_order);
 }
 
 void pb_matfile_frf(pb_matfile *mat, const char *name, size_t nf, size_t ny, size_t nu,
                     const double complex *h) {
-  const size_t count = nf * ny * nu, dims[3] = {ny, nu, nf};
-  if (!may_write(mat, name, 16 * count)) return;
-  put_matrix_head(mat->stream, name, MX_DOUBLE | COMPLEX, 3, dims, 16 + 16 * count);
-  for (int part = 0; part < 2; part++) {
-    put_tag(mat->stream, MI_DOUBLE, 8 * count);
-    for (size_t k = 0; k < count; k++) {
-      size_t o = k % ny, i = k / ny % nu, f = k / ny / nu;
-      fwrite((const double *)&h[(f * ny + o) * nu + i] + part, 8, 1, mat->stream);
-    }
-  }
+  size_t dims[3] = {ny, nu, nf};
+  put_complex(mat, name, 3, dims, nf * ny * nu, h, response_order);
 }
 
 // ---- texts --------------------------------------------------------------------------------------
@@ -161,38 +146,39 @@ static size_t character_count(const char *text) {
   return count;
 }
 
-static size_t text_data_size(const char *text) {
-  return 8 + padded(strlen(text));
-}
-
-// Dimensions count characters, the data element counts bytes.
-static void put_text(pb_matfile *mat, const char *name, const char *text) {
+static matvar_t *new_text(const char *name, const char *text) {
   size_t dims[2] = {text[0] != 0, character_count(text)};
-  put_matrix_head(mat->stream, name, MX_CHAR, 2, dims, text_data_size(text));
-  put_element(mat->stream, MI_UTF8, text, strlen(text));
+  return Mat_VarCreate(name, MAT_C_CHAR, MAT_T_UTF8, 2, dims, (void *)text, 0);
 }
 
 void pb_matfile_text(pb_matfile *mat, const char *name, const char *text) {
-  if (may_write(mat, name, strlen(text))) put_text(mat, name, text);
+  if (may_write(mat, name, strlen(text))) put(mat, new_text(name, text), name, strlen(text));
 }
 
 void pb_matfile_names(pb_matfile *mat, const char *name, const char *const *text, size_t count) {
   size_t bytes = 0, dims[2] = {count, 1};
-  for (size_t i = 0; i < count; i++) bytes += 8 + matrix_size("", 2, text_data_size(text[i]));
+  for (size_t i = 0; i < count; i++) bytes += strlen(text[i]);
   if (!may_write(mat, name, bytes)) return;
-  put_matrix_head(mat->stream, name, MX_CELL, 2, dims, bytes);
-  for (size_t i = 0; i < count; i++) put_text(mat, "", text[i]);
+  matvar_t *v = Mat_VarCreate(name, MAT_C_CELL, MAT_T_CELL, 2, dims, NULL, 0);
+  for (size_t i = 0; v && i < count; i++) Mat_VarSetCell(v, (int)i, new_text(NULL, text[i]));
+  put(mat, v, name, bytes);
 }
 
 // ---- end ----------------------------------------------------------------------------------------
 
-pb_status pb_matfile_close(pb_matfile *mat, pb_error *err) {
-  bool bad = ferror(mat->stream) != 0;
-  bool written = fclose(mat->stream) == 0 && !bad;
-  mat->stream = NULL;
-  if (!written && !mat->error.code) {
-    pb_fail(&mat->error, PB_ERR_IO, mat->file.path, "cannot be written: %s", strerror(errno));
+static void check_size(pb_matfile *mat) {
+  struct stat info;
+  bool known = stat(mat->file.temp, &info) == 0;
+  if (mat->error.code || (known && !S_ISREG(info.st_mode))) return;
+  if (!known || (size_t)info.st_size < mat->needed) {
+    pb_fail(&mat->error, PB_ERR_IO, mat->file.path, "cannot be written: is the disk full?");
   }
+}
+
+pb_status pb_matfile_close(pb_matfile *mat, pb_error *err) {
+  Mat_Close(mat->mat);
+  mat->mat = NULL;
+  check_size(mat);
   pb_status status = mat->error.code;
   if (status) {
     if (err) *err = mat->error;
@@ -205,7 +191,7 @@ pb_status pb_matfile_close(pb_matfile *mat, pb_error *err) {
 
 void pb_matfile_discard(pb_matfile *mat) {
   if (!mat) return;
-  if (mat->stream) fclose(mat->stream);
+  if (mat->mat) Mat_Close(mat->mat);
   pb_outfile_discard(&mat->file);
   free(mat);
 }
