@@ -142,9 +142,9 @@ static void spread(const pb_fit_data *d, size_t pairs, pb_fit_poles *poles) {
 typedef struct search {
   const pb_fit_data *data;
   pb_fit_poles now, best;
-  double complex *before; // [capacity]
-  double *c;              // [channels][capacity + 1]
-  double complex *error;  // [channels][lines]
+  double complex *before;  // [capacity]
+  double *c;               // [channels][capacity + 1]
+  double complex *error;   // [channels][lines]
   double now_rms, best_rms;
 } search;
 

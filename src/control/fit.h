@@ -16,22 +16,22 @@
 #include "signal/frf.h"
 
 typedef enum pb_fit_weight {
-  PB_FIT_RELATIVE, // 1/|H|: the same relative accuracy in valleys as on peaks; for clean data
-  PB_FIT_NOISE,    // 1/√(σ² + (floor |H|)²), σ² the variance of the estimate; for noisy data
+  PB_FIT_RELATIVE,  // 1/|H|: the same relative accuracy in valleys as on peaks; for clean data
+  PB_FIT_NOISE,  // 1/√(σ² + (floor |H|)²), σ² the variance of the estimate; for noisy data
 } pb_fit_weight;
 
 typedef struct pb_fit_options {
-  double sample_rate; // Hz
-  double f1, f2;      // Hz, lines used; both 0: all
-  size_t poles;       // order; 0: found
-  size_t max_poles;   // limit of the search; 0: 40
-  double tolerance;   // relative rms error at which the search ends; 0: 1e-7
-  double floor;       // of PB_FIT_NOISE: relative error that the data has at best; 0: 1e-4
+  double sample_rate;  // Hz
+  double f1, f2;       // Hz, lines used; both 0: all
+  size_t poles;        // order; 0: found
+  size_t max_poles;    // limit of the search; 0: 40
+  double tolerance;    // relative rms error at which the search ends; 0: 1e-7
+  double floor;        // of PB_FIT_NOISE: relative error that the data has at best; 0: 1e-4
   pb_fit_weight weight;
 } pb_fit_options;
 
 typedef struct pb_fit_channel {
-  size_t output, input; // of the frf
+  size_t output, input;  // of the frf
 } pb_fit_channel;
 
 // Zero-initialise; free with pb_fit_clear. Poles: one entry a conjugate pair (Im w > 0) or real
@@ -39,12 +39,12 @@ typedef struct pb_fit_channel {
 typedef struct pb_fit {
   double sample_rate;
   size_t channels, poles;
-  double complex *w;       // [poles] rad/s
-  pb_pole *pole;           // [poles] by frequency
-  double *strength;        // [poles] largest peak |r|/|Re p| of a channel over its median |H|
-  double complex *residue; // [channels][poles]; of a pair: that of the upper pole
-  double *direct;          // [channels] d
-  double error;            // √(Σ|Ĥ − H|² / Σ|H|²) over the lines, rms over the channels
+  double complex *w;        // [poles] rad/s
+  pb_pole *pole;            // [poles] by frequency
+  double *strength;         // [poles] largest peak |r|/|Re p| of a channel over its median |H|
+  double complex *residue;  // [channels][poles]; of a pair: that of the upper pole
+  double *direct;           // [channels] d
+  double error;             // √(Σ|Ĥ − H|² / Σ|H|²) over the lines, rms over the channels
 } pb_fit;
 
 // Fits channel[channels] of a measured response. Lines with infinite variance are left out. [init]

@@ -7,16 +7,16 @@
 // The lines and channels used, scaled: frequency by `scale`, each channel by its weights.
 typedef struct pb_fit_data {
   size_t lines, channels;
-  double scale;      // rad/s; w is divided by it
-  double *x;         // [lines] Im w / scale, ascending
-  double complex *h; // [channels][lines]
-  double *weight;    // [channels][lines]
+  double scale;       // rad/s; w is divided by it
+  double *x;          // [lines] Im w / scale, ascending
+  double complex *h;  // [channels][lines]
+  double *weight;     // [channels][lines]
 } pb_fit_data;
 
 // A model under way: n real parameters of poles, pairs at (k, k+1) with conjugate p[k+1].
 typedef struct pb_fit_poles {
   size_t n;
-  double complex *p; // [capacity] scaled
+  double complex *p;  // [capacity] scaled
 } pb_fit_poles;
 
 // The basis at one line into phi[n]: 1/(w−p); for a pair 1/(w−p) + 1/(w−p*) and i/(w−p) − i/(w−p*).

@@ -11,9 +11,9 @@
 #include "control/lti.h"
 
 typedef struct pb_iff {
-  double gain;          // g, input unit per output unit and second; any sign
-  double integrator_hz; // ω_i / 2π, > 0
-  double highpass_hz;   // ω_h / 2π, > 0
+  double gain;           // g, input unit per output unit and second; any sign
+  double integrator_hz;  // ω_i / 2π, > 0
+  double highpass_hz;    // ω_h / 2π, > 0
 } pb_iff;
 
 // The corner frequencies of the report, 2 Hz and 0.5 Hz.

@@ -66,7 +66,7 @@ pb_status pb_loop_closed(const pb_loop *loop, double gain, pb_lti *out, pb_error
   if (status == PB_OK) status = pb_loop_delayed_controller(loop, gain, &delayed, err);
   if (status == PB_OK) status = spread_controller(loop, &delayed, &spread, err);
   if (status == PB_OK) {
-    spread.dt = plant.dt; // equal to 1e-9, made equal to the bit
+    spread.dt = plant.dt;  // equal to 1e-9, made equal to the bit
     status = pb_lti_feedback(&plant, &spread, 1, out, err);
   }
   pb_lti_free(&plant);

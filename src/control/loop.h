@@ -9,8 +9,9 @@
 // Closed-loop poles are the roots of det(I − L(z)), L = sign·gain·z^{−delay} S P E K. A plant of up
 // to PB_LOOP_DENSE states is solved in dense state space. A larger one gives starting values
 // through its lowest modes (static contribution of the others kept), which are then made exact on
-// the full plant: O. Aberth's simultaneous iteration (1973) on p(z) = det(I − L(z)) Π(z − open-loop
-// pole), a polynomial, with p'/p = −tr((I − L)⁻¹ L') + Σ 1/(z − pole). No large matrix appears.
+// the full plant: Newton's method on p(z) = det(I − L(z)) Π(z − open-loop pole), a polynomial, with
+// p'/p = −tr((I − L)⁻¹ L') + Σ 1/(z − pole); starts that arrive where others are go back and are
+// kept apart from them (O. Aberth, 1973). No large matrix appears.
 #ifndef PB_CONTROL_LOOP_H
 #define PB_CONTROL_LOOP_H
 
@@ -25,11 +26,11 @@ enum { PB_LOOP_DENSE = 160 };
 // Everything pointed to stays the caller's and must outlive the loop's use.
 typedef struct pb_loop {
   const pb_model *model;
-  const pb_lti *controller; // discrete, dt = 1 / model->sample_rate
-  const size_t *output;     // [controller->nu] of the model
-  const size_t *input;      // [controller->ny] of the model
-  double sign;              // +1 or −1
-  unsigned delay;           // whole samples
+  const pb_lti *controller;  // discrete, dt = 1 / model->sample_rate
+  const size_t *output;      // [controller->nu] of the model
+  const size_t *input;       // [controller->ny] of the model
+  double sign;               // +1 or −1
+  unsigned delay;            // whole samples
 } pb_loop;
 
 // All functions: [init]; PB_ERR_ARGUMENT (sizes, indices, period, non-finite gain), PB_ERR_MEMORY.
@@ -61,8 +62,20 @@ const pb_loop *pb_loop_solver_loop(const pb_loop_solver *solver);
 pb_status pb_loop_solver_poles(pb_loop_solver *solver, double gain, double f1, double f2,
                                pb_pole_list *out, pb_error *err);
 
-// Whether all closed-loop poles are inside the unit circle; *worst (may be NULL) is the pole of the
-// largest |z|.
+// The same without the iteration: of a large plant the poles with its low modes only.
+pb_status pb_loop_solver_estimate(pb_loop_solver *solver, double gain, double f1, double f2,
+                                  pb_pole_list *out, pb_error *err);
+
+// Makes estimates exact, in place; one that leads nowhere becomes NaN.
+pb_status pb_loop_solver_polish(pb_loop_solver *solver, double gain, pb_pole *pole, size_t count,
+                                pb_error *err);
+
+// Whether all closed-loop poles are inside the unit circle. Up to PB_LOOP_STABLE_DENSE states by
+// the dense eigenvalues. Above by the argument principle: det(I − L(z)) turns −2π·(poles outside)
+// along the circle when the open loop has none outside; the phase is followed in steps of less than
+// a radian, finest where poles are near. *worst (may be NULL) is the pole of largest |z| that is
+// known. The open loop must be stable (a floating plant is PB_ERR_STATE above that size).
+enum { PB_LOOP_STABLE_DENSE = 400 };
 pb_status pb_loop_solver_stable(pb_loop_solver *solver, double gain, bool *stable, pb_pole *worst,
                                 pb_error *err);
 

@@ -10,4 +10,18 @@ pb_status pb_loop_check(const pb_loop *loop, double gain, pb_error *err);
 // sign·gain·z^{−delay} K(z), on the loop's own channels.
 pb_status pb_loop_delayed_controller(const pb_loop *loop, double gain, pb_lti *out, pb_error *err);
 
+struct pb_loop_solver {
+  pb_loop loop;
+  bool exact;              // `plant` is the whole plant
+  pb_lti plant;            // the loop's channels only, sampled; reduced unless exact
+  pb_model channels;       // the whole plant with the loop's channels only; shares A with the model
+  size_t open_count;       // open-loop poles: plant, controller
+  double complex *open;    // [open_count] as z
+  size_t far_count;        // of the poles that the reduction left out
+  double complex *far;     // [far_count]
+  double complex *h, *dh;  // [n_out][n_in] of the plant at a point
+  double complex *k, *dk;  // [n_in][n_out] of the controller at a point
+  double complex *m, *rhs;  // [n_in × n_in]
+};
+
 #endif

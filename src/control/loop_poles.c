@@ -9,22 +9,10 @@
 #include "signal/small_solve.h"
 
 enum { REDUCED_STATES = 120, MAX_ITERATIONS = 60 };
+// A root counts as found when its s stands still to this part: a double root cannot do much better.
+static const double good_enough = 1e-4;
 static const double smallest_z = 0.3;  // poles below vanish within a few samples
 static const double doubtful_z = 0.8;  // starts below may be the reduction's own
-
-struct pb_loop_solver {
-  pb_loop loop;
-  bool exact;              // `plant` is the whole plant
-  pb_lti plant;            // the loop's channels only, sampled; reduced unless exact
-  pb_model channels;       // the whole plant with the loop's channels only; shares A with the model
-  size_t open_count;       // open-loop poles: plant, controller
-  double complex *open;    // [open_count] as z
-  size_t far_count;        // of the poles that the reduction left out
-  double complex *far;     // [far_count]
-  double complex *h, *dh;  // [n_out][n_in] of the plant at a point
-  double complex *k, *dk;  // [n_in][n_out] of the controller at a point
-  double complex *m, *rhs; // [n_in × n_in]
-};
 
 const pb_loop *pb_loop_solver_loop(const pb_loop_solver *solver) {
   return &solver->loop;
@@ -222,71 +210,102 @@ static bool log_derivative(pb_loop_solver *s, double gain, double complex z,
   return isfinite(creal(sum)) && isfinite(cimag(sum));
 }
 
-// One Aberth correction of root i; returns its size relative to |z|, 0 when it stays where it is.
+// Far from the root a correction is only a direction: a fraction of |s| T ≈ |z − 1| is enough.
+static double complex limited(double complex step, double complex z) {
+  double size = cabs(step), limit = 0.1 * cabs(z - 1);
+  return size > limit ? step * (limit / size) : step;
+}
+
+// One correction of root i, pushed away from the others (Aberth); returns its size relative to |z|,
+// 0 when it stays where it is.
 static double correct(pb_loop_solver *s, double gain, double complex *z, size_t count, size_t i) {
-  double complex ratio;
+  double complex ratio, others = 0;
   if (!log_derivative(s, gain, z[i], &ratio)) return 0;
-  double complex others = 0;
   for (size_t j = 0; j < count; j++) {
     if (j != i && z[j] != z[i]) others += 1 / (z[i] - z[j]);
   }
   double complex step = 1 / (ratio - others);
-  // Far from the root the correction is only a direction: a fraction of |s| T ≈ |z − 1| is enough.
-  double size = cabs(step), limit = 0.1 * cabs(z[i] - 1);
+  double size = cabs(step);
   if (!isfinite(size)) return 0;
-  if (size > limit) step *= limit / size;
-  z[i] -= step;
+  z[i] -= limited(step, z[i]);
   return size / cabs(z[i]);
 }
 
-// Off an open-loop pole that the loop does not move, where the determinant has no value; each start in
-// its own direction, or the starts of a double pole would push each other away.
+// Off an open-loop pole that the loop does not move, where the determinant has no value; each start
+// in its own direction, or the starts of a double pole would push each other away.
 static void spread_starts(double complex *z, size_t count) {
   for (size_t i = 0; i < count; i++) {
     double angle = 2.4 * (double)i;
-    z[i] += 1e-8 * cabs(z[i]) * CMPLX(cos(angle), cimag(z[i]) == 0 ? 0 : sin(angle));
+    z[i] += 1e-4 * cabs(z[i] - 1) * CMPLX(cos(angle), cimag(z[i]) == 0 ? 0 : sin(angle));
   }
 }
 
-// Takes out what did not converge. The static terms of the reduced plant act a sample late and add a
-// state a loop: as many starts belong to nothing. Well inside the unit circle any start may.
-static pb_status drop_unconverged(const pb_loop_solver *s, double complex *z, size_t *count,
-                                  const double *start, const double *last, pb_error *err) {
-  size_t kept = 0, lost = 0;
-  double worst = 0;
-  for (size_t i = 0; i < *count; i++) {
-    bool converged = last[i] < 1e-7;
-    if (converged) z[kept++] = z[i];
-    if (converged || start[i] < doubtful_z) continue;
-    lost++;
-    worst = fmax(worst, start[i]);
-  }
-  *count = kept;
-  if (lost <= s->loop.controller->ny) return PB_OK;
-  return pb_fail(err, PB_ERR_NUMERIC, "loop", "%zu closed-loop poles did not converge, up to |z| = %.3g",
-                 lost, worst);
-}
-
-// Makes the roots z[*count] exact on the whole plant.
-static pb_status polish(pb_loop_solver *s, double gain, double complex *z, size_t *count,
-                        pb_error *err) {
-  double *start = malloc((*count + 1) * sizeof *start), *last = malloc((*count + 1) * sizeof *last);
-  pb_status status = start && last ? PB_OK : pb_fail_memory(err, "loop");
-  for (size_t i = 0; i < *count && status == PB_OK; i++) {
-    start[i] = cabs(z[i]);
-    last[i] = INFINITY;
-  }
-  if (status == PB_OK) spread_starts(z, *count);
-  for (int it = 0; it < MAX_ITERATIONS && status == PB_OK; it++) {
+// Makes the roots z[count] exact on the whole plant; last[count]: size of each last correction.
+static void iterate(pb_loop_solver *s, double gain, double complex *z, size_t count, double *last) {
+  for (size_t i = 0; i < count; i++) last[i] = INFINITY;
+  spread_starts(z, count);
+  for (int it = 0; it < MAX_ITERATIONS; it++) {
     size_t moving = 0;
-    for (size_t i = 0; i < *count; i++) {
+    for (size_t i = 0; i < count; i++) {
       if (last[i] < 1e-12) continue;
-      last[i] = correct(s, gain, z, *count, i);
+      last[i] = correct(s, gain, z, count, i);
       moving += last[i] >= 1e-12;
     }
-    if (moving == 0) break;
+    if (moving == 0) return;
   }
-  if (status == PB_OK) status = drop_unconverged(s, z, count, start, last, err);
+}
+
+// One root by Newton's method alone. Steps that shrink by a constant factor tell a multiple root:
+// the rest of their sum is then taken at once. Returns the size of the last step relative to |z|.
+static double newton(pb_loop_solver *s, double gain, double complex *z) {
+  double complex before = 0, ratio;
+  double size = INFINITY;
+  *z *= 1 - 1e-9;  // off an open-loop pole that the loop does not move
+  for (int it = 0; it < MAX_ITERATIONS && size >= 1e-12; it++) {
+    if (!log_derivative(s, gain, *z, &ratio)) return 0;
+    double complex step = 1 / ratio, shrink = before != 0 ? step / before : 0;
+    if (!isfinite(cabs(step))) return 0;
+    before = step;
+    if (creal(shrink) > 0.3 && creal(shrink) < 0.95 && fabs(cimag(shrink)) < 0.2) {
+      step /= 1 - shrink;
+      before = 0;
+    }
+    size = cabs(step) / cabs(*z);
+    *z -= limited(step, *z);
+  }
+  return size;
+}
+
+static bool has_converged(double complex z, double last) {
+  return last * cabs(z) < good_enough * cabs(z - 1);
+}
+
+// Takes out what did not converge, and counts it. The static terms of the reduced plant act a
+// sample late and add a state a loop: as many starts belong to nothing. Well inside the circle any
+// may.
+static size_t drop_unconverged(const pb_loop_solver *s, double complex *z, size_t *count,
+                               const double complex *start, const double *last) {
+  size_t kept = 0, lost = 0;
+  for (size_t i = 0; i < *count; i++) {
+    bool converged = has_converged(z[i], last[i]);
+    if (converged) z[kept++] = z[i];
+    lost += !converged && cabs(start[i]) >= doubtful_z;
+  }
+  *count = kept;
+  size_t spurious = s->loop.controller->ny;
+  return lost > spurious ? lost - spurious : 0;
+}
+
+static pb_status polish(pb_loop_solver *s, double gain, double complex *z, size_t *count,
+                        size_t *lost, pb_error *err) {
+  double complex *start = malloc((*count + 1) * sizeof *start);
+  double *last = malloc((*count + 1) * sizeof *last);
+  pb_status status = start && last ? PB_OK : pb_fail_memory(err, "loop");
+  if (status == PB_OK) {
+    memcpy(start, z, *count * sizeof *start);
+    iterate(s, gain, z, *count, last);
+    *lost = drop_unconverged(s, z, count, start, last);
+  }
   free(start);
   free(last);
   return status;
@@ -297,7 +316,7 @@ static size_t keep_band(double complex *z, size_t count, double rate, double f1,
                         double slack) {
   size_t kept = 0;
   for (size_t i = 0; i < count; i++) {
-    if (fabs(cimag(z[i])) < 1e-12 * cabs(z[i])) z[i] = creal(z[i]); // real but for rounding
+    if (fabs(cimag(z[i])) < 1e-12 * cabs(z[i])) z[i] = creal(z[i]);  // real but for rounding
     if (cimag(z[i]) < 0 || cabs(z[i]) < smallest_z) continue;
     double hz = cabs(pb_pole_s(z[i], rate)) / (2 * M_PI);
     if (hz >= f1 / slack && hz <= f2 * slack) z[kept++] = z[i];
@@ -305,8 +324,9 @@ static size_t keep_band(double complex *z, size_t count, double rate, double f1,
   return kept;
 }
 
-pb_status pb_loop_solver_poles(pb_loop_solver *s, double gain, double f1, double f2,
-                               pb_pole_list *out, pb_error *err) {
+// The closed-loop poles of the band, on the reduced plant only unless `exact`.
+static pb_status find_poles(pb_loop_solver *s, double gain, double f1, double f2, bool exact,
+                            pb_pole_list *out, pb_error *err) {
   *out = (pb_pole_list){0};
   pb_status status = pb_loop_check(&s->loop, gain, err);
   if (status != PB_OK) return status;
@@ -318,7 +338,7 @@ pb_status pb_loop_solver_poles(pb_loop_solver *s, double gain, double f1, double
   if (!s->exact) {
     memcpy(z + count, s->far, s->far_count * sizeof *z);
     count = keep_band(z, count + s->far_count, rate, f1, f2, 1.25);
-    status = polish(s, gain, z, &count, err);
+    if (exact) status = polish(s, gain, z, &count, &out->lost, err);
   }
   if (status == PB_OK) {
     count = keep_band(z, count, rate, f1, f2, 1);
@@ -334,17 +354,27 @@ pb_status pb_loop_solver_poles(pb_loop_solver *s, double gain, double f1, double
   return status;
 }
 
-pb_status pb_loop_solver_stable(pb_loop_solver *s, double gain, bool *stable, pb_pole *worst,
+pb_status pb_loop_solver_poles(pb_loop_solver *s, double gain, double f1, double f2,
+                               pb_pole_list *out, pb_error *err) {
+  return find_poles(s, gain, f1, f2, true, out, err);
+}
+
+pb_status pb_loop_solver_estimate(pb_loop_solver *s, double gain, double f1, double f2,
+                                  pb_pole_list *out, pb_error *err) {
+  return find_poles(s, gain, f1, f2, false, out, err);
+}
+
+pb_status pb_loop_solver_polish(pb_loop_solver *s, double gain, pb_pole *pole, size_t count,
                                 pb_error *err) {
-  pb_pole_list list;
-  pb_status status = pb_loop_solver_poles(s, gain, 0, INFINITY, &list, err);
-  if (status != PB_OK) return status;
-  size_t largest = 0;
-  for (size_t i = 1; i < list.count; i++) {
-    if (cabs(list.item[i].z) > cabs(list.item[largest].z)) largest = i;
+  pb_status status = pb_loop_check(&s->loop, gain, err);
+  if (status != PB_OK || s->exact) return status;
+  for (size_t i = 0; i < count; i++) {
+    double complex z = pole[i].z;
+    double last = newton(s, gain, &z);
+    if (fabs(cimag(z)) < 1e-12 * cabs(z)) z = creal(z);
+    bool good = has_converged(z, last) && cimag(z) >= 0;
+    pole[i] = good ? pb_pole_from_z(z, s->loop.model->sample_rate)
+                   : (pb_pole){.z = NAN, .hz = NAN, .damping = NAN};
   }
-  *stable = list.count == 0 || cabs(list.item[largest].z) < 1;
-  if (worst) *worst = list.count ? list.item[largest] : (pb_pole){0};
-  pb_pole_list_clear(&list);
   return PB_OK;
 }

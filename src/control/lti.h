@@ -15,11 +15,11 @@
 
 typedef struct pb_lti {
   size_t nx, nu, ny;
-  double dt; // seconds; 0: continuous time
-  double *a; // nx × nx
-  double *b; // nx × nu
-  double *c; // ny × nx
-  double *d; // ny × nu
+  double dt;  // seconds; 0: continuous time
+  double *a;  // nx × nx
+  double *b;  // nx × nu
+  double *c;  // ny × nx
+  double *d;  // ny × nu
 } pb_lti;
 
 // Allocates zeroed matrices of the given sizes into *out (freed with pb_lti_free).

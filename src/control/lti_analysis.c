@@ -41,11 +41,11 @@ done:
 // H = Qᵀ A Q upper Hessenberg, QᵀB and C Q.
 typedef struct hessenberg {
   size_t n;
-  double *h;         // n × n row-major, so that elimination runs along rows
-  double *b;         // n × nu row-major
-  double *c;         // ny × n column-major
-  double complex *m; // n × n row-major, of one frequency
-  double complex *x; // n × nu row-major
+  double *h;          // n × n row-major, so that elimination runs along rows
+  double *b;          // n × nu row-major
+  double *c;          // ny × n column-major
+  double complex *m;  // n × n row-major, of one frequency
+  double complex *x;  // n × nu row-major
 } hessenberg;
 
 static void hessenberg_free(hessenberg *s) {

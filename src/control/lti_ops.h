@@ -36,8 +36,8 @@ pb_status pb_lti_feedback(const pb_lti *g, const pb_lti *k, double sign, pb_lti 
 pb_status pb_lti_delay(const pb_lti *lti, unsigned samples, pb_lti *out, pb_error *err);
 
 typedef enum pb_c2d_method {
-  PB_C2D_ZOH,    // exact for an input held over each period: e^{[A B; 0 0] T}
-  PB_C2D_TUSTIN, // s → (2/T)(z − 1)/(z + 1)
+  PB_C2D_ZOH,     // exact for an input held over each period: e^{[A B; 0 0] T}
+  PB_C2D_TUSTIN,  // s → (2/T)(z − 1)/(z + 1)
 } pb_c2d_method;
 
 // Discretises a continuous system with period dt. PB_ERR_SINGULAR: Tustin with a pole at 2/T.

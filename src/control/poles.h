@@ -7,13 +7,14 @@
 
 typedef struct pb_pole {
   double complex z;
-  double hz;      // |s| / 2π
-  double damping; // −Re s / |s|; negative: unstable
+  double hz;       // |s| / 2π
+  double damping;  // −Re s / |s|; negative: unstable
 } pb_pole;
 
 // Zero-initialise; free with pb_pole_list_clear.
 typedef struct pb_pole_list {
   size_t count;
+  size_t lost;  // starting values of an iteration that led to no pole; 0 from direct methods
   pb_pole *item;
 } pb_pole_list;
 

@@ -5,8 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "control/lti_ops.h"
-
 enum { SEARCH_GAINS = 41, REFINE_GAINS = 9, REFINE_ROUNDS = 2 };
 
 void pb_rootlocus_clear(pb_rootlocus *locus) {
@@ -70,26 +68,37 @@ static void find_smallest(pb_rootlocus *l, size_t k) {
   l->smallest[k] = smallest;
 }
 
-// Poles at one gain over the band in which branches are followed.
-static pb_status poles_at(pb_loop_solver *s, double gain, double f2, pb_pole_list *list,
-                          pb_error *err) {
-  return pb_loop_solver_poles(s, gain, 0, 3 * f2, list, err);
+// Makes step k of all branches exact on the whole plant.
+static pb_status polish_step(pb_loop_solver *s, pb_rootlocus *l, size_t k, pb_error *err) {
+  pb_pole *pole = malloc((l->branches + 1) * sizeof *pole);
+  if (!pole) return pb_fail_memory(err, "root locus");
+  size_t count = 0;
+  for (size_t b = 0; b < l->branches; b++) {
+    if (!isnan(l->pole[b * l->gains + k].hz)) pole[count++] = l->pole[b * l->gains + k];
+  }
+  pb_status status = pb_loop_solver_polish(s, l->gain[k], pole, count, err);
+  count = 0;
+  for (size_t b = 0; b < l->branches && status == PB_OK; b++) {
+    if (!isnan(l->pole[b * l->gains + k].hz)) l->pole[b * l->gains + k] = pole[count++];
+  }
+  free(pole);
+  return status;
 }
 
-// Fills steps 1.. of a locus whose step 0 holds the starting poles.
-static pb_status follow(pb_loop_solver *s, double f2, pb_rootlocus *l, bool *unstable,
-                        pb_error *err) {
+// Fills steps 1.. of a locus whose step 0 holds the starting poles. Branches are matched on the
+// estimates of all poles up to 2 f2, and only what was matched is made exact.
+static pb_status follow(pb_loop_solver *s, double f2, pb_rootlocus *l, pb_error *err) {
   pb_status status = PB_OK;
   find_smallest(l, 0);
   for (size_t k = 1; k < l->gains && status == PB_OK; k++) {
     pb_pole_list list = {0};
-    status = poles_at(s, l->gain[k], f2, &list, err);
+    status = pb_loop_solver_estimate(s, l->gain[k], 0, 2 * f2, &list, err);
     bool *used = status == PB_OK ? malloc(list.count + 1) : NULL;
     if (status == PB_OK && !used) status = pb_fail_memory(err, "root locus");
     if (status == PB_OK) {
       match(l, k, &list, used);
+      status = polish_step(s, l, k, err);
       find_smallest(l, k);
-      for (size_t p = 0; unstable && p < list.count; p++) unstable[k] |= cabs(list.item[p].z) >= 1;
     }
     free(used);
     pb_pole_list_clear(&list);
@@ -97,38 +106,34 @@ static pb_status follow(pb_loop_solver *s, double f2, pb_rootlocus *l, bool *uns
   return status;
 }
 
-// The open-loop poles: of the controller, so that a branch can be told to be a mode of the plant.
-static bool is_controller_pole(const double complex *kpole, size_t count, double complex z) {
+// Whether z is a lightly damped pole of the plant in the band. Judged by the continuous poles: a
+// mode above half the sample rate appears in the band under another mode's frequency.
+static bool is_plant_mode(const double complex *pole, size_t count, double rate, double f1,
+                          double f2, double complex z) {
   for (size_t k = 0; k < count; k++) {
-    if (cabs(kpole[k] - z) < 1e-9) return true;
+    double hz = cabs(pole[k]) / (2 * M_PI);
+    bool light = cimag(pole[k]) > 0 && -creal(pole[k]) < 0.7 * cabs(pole[k]);
+    if (light && hz >= f1 && hz <= f2 && hz < rate / 2 && cabs(cexp(pole[k] / rate) - z) < 1e-8)
+      return true;
   }
   return false;
-}
-
-static pb_status controller_poles(const pb_loop_solver *s, double complex **poles, size_t *count,
-                                  pb_error *err) {
-  const pb_lti *k = pb_loop_solver_loop(s)->controller;
-  *count = k->nx;
-  *poles = malloc((k->nx + 1) * sizeof **poles);
-  if (!*poles) return pb_fail_memory(err, "root locus");
-  return pb_lti_poles(k, *poles, err);
 }
 
 // A locus of `gains` points whose branches start at the open-loop poles of the band.
 static pb_status start(pb_loop_solver *s, size_t gains, double f1, double f2, pb_rootlocus *out,
                        pb_error *err) {
+  const pb_model *m = pb_loop_solver_loop(s)->model;
   pb_pole_list list = {0};
-  double complex *kpole = NULL;
-  size_t kpoles = 0;
-  pb_status status = controller_poles(s, &kpole, &kpoles, err);
+  double complex *pole = malloc((m->nx + 1) * sizeof *pole);
+  pb_status status =
+      pole ? pb_model_poles(m, PB_CONTINUOUS, pole, err) : pb_fail_memory(err, "root locus");
   if (status == PB_OK) status = pb_loop_solver_poles(s, 0, f1, f2, &list, err);
   if (status == PB_OK) status = allocate(gains, list.count, out, err);
   for (size_t b = 0; status == PB_OK && b < list.count; b++) {
     out->pole[b * gains] = list.item[b];
-    out->is_mode[b] = list.item[b].damping < 0.7 && cimag(list.item[b].z) > 0 &&
-                      !is_controller_pole(kpole, kpoles, list.item[b].z);
+    out->is_mode[b] = is_plant_mode(pole, m->nx, m->sample_rate, f1, f2, list.item[b].z);
   }
-  free(kpole);
+  free(pole);
   pb_pole_list_clear(&list);
   return status;
 }
@@ -150,7 +155,7 @@ pb_status pb_rootlocus_compute(pb_loop_solver *s, const double *gain, size_t gai
   if (status == PB_OK) {
     l.gain[0] = 0;
     memcpy(l.gain + extra, gain, gains * sizeof *gain);
-    status = follow(s, f2, &l, NULL, err);
+    status = follow(s, f2, &l, err);
   }
   if (status == PB_OK) status = allocate(gains, l.branches, out, err);
   if (status == PB_OK) {
@@ -210,15 +215,60 @@ static size_t best_of(const pb_rootlocus *l, const bool *unstable) {
   return best;
 }
 
+// Leaves out gains that cannot be doubled, as all poles of the whole plant say. Instability is
+// taken to stay once it is there, so that the last good gain below the best one is found by
+// bisection.
+static pb_status keep_margin(pb_loop_solver *s, const pb_rootlocus *l, bool *unstable,
+                             pb_error *err) {
+  size_t bad = best_of(l, unstable), good = 0;
+  bool stable;
+  if (bad == l->gains) return PB_OK;
+  pb_status status = pb_loop_solver_stable(s, 2 * l->gain[bad], &stable, NULL, err);
+  if (status != PB_OK || stable) return status;
+  while (bad - good > 1 && status == PB_OK) {
+    size_t middle = (good + bad) / 2;
+    status = pb_loop_solver_stable(s, 2 * l->gain[middle], &stable, NULL, err);
+    if (stable)
+      good = middle;
+    else
+      bad = middle;
+  }
+  for (size_t k = bad; k < l->gains; k++) unstable[k] = true;
+  return status;
+}
+
+// Modes that no gain damps beyond 1 % and three times what they have are not counted against a
+// gain.
+static void forget_unreachable(pb_rootlocus *l) {
+  bool *counts = l->is_mode;
+  size_t reachable = 0;
+  for (int pass = 0; pass < 2; pass++) {
+    for (size_t b = 0; b < l->branches; b++) {
+      const pb_pole *p = l->pole + b * l->gains;
+      double most = 0;
+      for (size_t k = 1; k < l->gains; k++) {
+        if (p[k].damping > most) most = p[k].damping;
+      }
+      bool reached = l->is_mode[b] && most > 0.01 && most > 3 * p[0].damping;
+      if (pass == 0) reachable += reached;
+      if (pass == 1 && reachable > 0) counts[b] = reached;
+    }
+  }
+  for (size_t k = 0; k < l->gains; k++) find_smallest(l, k);
+}
+
 // Repeats the search between the neighbours of the best gain, starting from the lower one's poles.
-static pb_status refine(pb_loop_solver *s, double f2, const pb_rootlocus *from, size_t best,
-                        unsigned rounds, pb_best_gain *out, pb_error *err) {
-  size_t low = best - 1, high = best + 1 < from->gains ? best + 1 : best;
+// unstable (may be NULL): gains of `from` that must not be reached.
+static pb_status refine(pb_loop_solver *s, double f2, const pb_rootlocus *from,
+                        const bool *unstable, size_t best, unsigned rounds, pb_best_gain *out,
+                        pb_error *err) {
+  size_t low = best - 1, high = best + 1;
+  if (high == from->gains || (unstable && unstable[high])) high = best;
   out->gain = from->gain[best];
   out->smallest_damping = from->smallest[best];
   if (rounds == 0) return PB_OK;
   pb_rootlocus l;
-  bool unstable[REFINE_GAINS] = {false};
+  const bool allowed[REFINE_GAINS] = {false};
   pb_status status = allocate(REFINE_GAINS, from->branches, &l, err);
   if (status != PB_OK) return status;
   memcpy(l.is_mode, from->is_mode, l.branches * sizeof *l.is_mode);
@@ -227,10 +277,10 @@ static pb_status refine(pb_loop_solver *s, double f2, const pb_rootlocus *from, 
   for (size_t k = 0; k < l.gains; k++) {
     l.gain[k] = g1 + (g2 - g1) * (double)k / (double)(l.gains - 1);
   }
-  status = follow(s, f2, &l, unstable, err);
-  size_t finer = status == PB_OK ? best_of(&l, unstable) : l.gains;
+  status = follow(s, f2, &l, err);
+  size_t finer = status == PB_OK ? best_of(&l, allowed) : l.gains;
   if (finer < l.gains && l.smallest[finer] >= from->smallest[best]) {
-    status = refine(s, f2, &l, finer, rounds - 1, out, err);
+    status = refine(s, f2, &l, NULL, finer, rounds - 1, out, err);
   }
   pb_rootlocus_clear(&l);
   return status;
@@ -277,7 +327,11 @@ pb_status pb_best_gain_find(pb_loop_solver *s, double f1, double f2, double deca
     double step = (double)(k - 1) / (SEARCH_GAINS - 2);
     l.gain[k] = unit * pow(10, decades * (2 * step - 1));
   }
-  status = follow(s, f2, &l, unstable, err);
+  status = follow(s, f2, &l, err);
+  if (status == PB_OK) {
+    forget_unreachable(&l);
+    status = keep_margin(s, &l, unstable, err);
+  }
   if (status == PB_OK) status = attainable(&l, unstable, out, err);
   if (status != PB_OK) goto done;
   size_t best = best_of(&l, unstable);
@@ -286,7 +340,7 @@ pb_status pb_best_gain_find(pb_loop_solver *s, double f1, double f2, double deca
                      "%zu modes in %g … %g Hz, none damped by a stable gain", out->modes, f1, f2);
     goto done;
   }
-  status = refine(s, f2, &l, best, REFINE_ROUNDS, out, err);
+  status = refine(s, f2, &l, unstable, best, REFINE_ROUNDS, out, err);
 done:
   pb_rootlocus_clear(&l);
   if (status != PB_OK) pb_best_gain_clear(out);

@@ -7,10 +7,10 @@
 // Zero-initialise; free with pb_rootlocus_clear.
 typedef struct pb_rootlocus {
   size_t gains, branches;
-  double *gain;     // [gains]
-  pb_pole *pole;    // [branches][gains]; a branch that was lost ends in hz = NaN
-  bool *is_mode;    // [branches] starts at an oscillatory pole of the plant (damping < 0.7)
-  double *smallest; // [gains] smallest damping of the modes; −1 where one is lost
+  double *gain;      // [gains]
+  pb_pole *pole;     // [branches][gains]; a branch that was lost ends in hz = NaN
+  bool *is_mode;     // [branches] starts at an oscillatory pole of the plant (damping < 0.7)
+  double *smallest;  // [gains] smallest damping of the modes; −1 where one is lost
 } pb_rootlocus;
 
 // Branches start at the poles with f1 ≤ |s|/2π ≤ f2 of the loop at zero gain, and are continued
@@ -25,16 +25,17 @@ void pb_rootlocus_clear(pb_rootlocus *locus);
 // The gain that gives the modes of the band their largest smallest damping.
 typedef struct pb_best_gain {
   double gain;
-  double smallest_damping; // at that gain
-  size_t modes;            // of the band
-  double *attainable;      // [modes] largest damping of each mode over all gains tried, owned
-  double *attained_at;     // [modes] the gain of it, owned
+  double smallest_damping;  // at that gain
+  size_t modes;             // of the band
+  double *attainable;       // [modes] largest damping of each mode over all gains tried, owned
+  double *attained_at;      // [modes] the gain of it, owned
 } pb_best_gain;
 
 // Searches a logarithmic range of gains around the one where the loop gain is 1, over `decades`
 // either side (0: 2), then refines to 1 %. sign of the gain: positive (the loop's sign says the
-// rest). Gains with an unstable pole up to 3 f2 are left out. [init]
-// PB_ERR_STATE: no mode in the band, or no gain that keeps the loop stable.
+// rest). Only gains are considered that can be doubled without instability. Modes that no gain
+// damps beyond 1 % and three times their own damping do not count, unless there are no others.
+// [init] PB_ERR_STATE: no mode in the band, or no gain that keeps the loop stable.
 pb_status pb_best_gain_find(pb_loop_solver *solver, double f1, double f2, double decades,
                             pb_best_gain *out, pb_error *err);
 

@@ -20,8 +20,9 @@ static double rms_of(const pb_frf *frf, size_t o, size_t i) {
 // Channels spread over outputs and experiments; those without any difference are left out.
 static size_t choose(const pb_frf *d, pb_fit_channel *channel) {
   size_t count = 0, all = d->ny * d->nu;
+  // A stride without a factor in common with the columns comes past all of them.
   size_t stride = all > MOST_CHANNELS ? all / MOST_CHANNELS + 1 : 1;
-  while (stride > 1 && (d->nu % stride == 0 || stride % d->nu == 0)) stride++;
+  while (d->nu > 1 && stride % d->nu != 1) stride++;
   for (size_t k = 0; k < all && count < MOST_CHANNELS; k += stride) {
     pb_fit_channel at = {k / d->nu, k % d->nu};
     if (rms_of(d, at.output, at.input) > 0) channel[count++] = at;

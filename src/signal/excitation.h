@@ -22,19 +22,19 @@
 typedef enum pb_phases { PB_PHASES_RANDOM, PB_PHASES_SCHROEDER } pb_phases;
 
 typedef struct pb_noise_spec {
-  double sample_rate; // Hz
-  double f1, f2;      // Hz, 0 ≤ f1 < f2 ≤ sample_rate / 2
-  double rms;         // of each input, exact over the n samples
-  bool periodic;      // repeats without a seam after n samples
+  double sample_rate;  // Hz
+  double f1, f2;       // Hz, 0 ≤ f1 < f2 ≤ sample_rate / 2
+  double rms;          // of each input, exact over the n samples
+  bool periodic;       // repeats without a seam after n samples
   uint64_t seed;
 } pb_noise_spec;
 
 typedef struct pb_multisine_spec {
-  double sample_rate; // Hz
-  double f1, f2;      // Hz, lines k with f1 ≤ k fs/N ≤ f2, k ≥ 1, below Nyquist
-  double rms;         // of each input, exact
+  double sample_rate;  // Hz
+  double f1, f2;       // Hz, lines k with f1 ≤ k fs/N ≤ f2, k ≥ 1, below Nyquist
+  double rms;          // of each input, exact
   pb_phases phases;
-  unsigned crest_iterations; // of crest-factor reduction; 0: none
+  unsigned crest_iterations;  // of crest-factor reduction; 0: none
   uint64_t seed;
 } pb_multisine_spec;
 

@@ -20,13 +20,13 @@
 // A plan and its work space. One thread at a time executes a plan.
 typedef struct pb_fft {
   size_t n;
-  size_t factors, factor[32]; // radices of the Stockham passes; 0 factors: Bluestein (or n = 1)
-  double complex *root;       // [n] e^{−2πi k/n}
-  double complex *work;       // [n], or [inner->n] for Bluestein
-  struct pb_fft *inner;       // Bluestein: transform of the convolution's length
-  double complex *chirp;      // [n] e^{−πi k²/n}
-  double complex *kernel;     // [inner->n] transform of the conjugate chirp, divided by inner->n
-  double complex *product;    // [inner->n]
+  size_t factors, factor[32];  // radices of the Stockham passes; 0 factors: Bluestein (or n = 1)
+  double complex *root;        // [n] e^{−2πi k/n}
+  double complex *work;        // [n], or [inner->n] for Bluestein
+  struct pb_fft *inner;        // Bluestein: transform of the convolution's length
+  double complex *chirp;       // [n] e^{−πi k²/n}
+  double complex *kernel;      // [inner->n] transform of the conjugate chirp, divided by inner->n
+  double complex *product;     // [inner->n]
 } pb_fft;
 
 // Prepares a transform of n points, 1 ≤ n ≤ PB_FFT_MAX_LENGTH. [init]

@@ -10,11 +10,11 @@
 // Arrays are row-major as written: h[(f*ny + o)*nu + i]. Zero-initialise; free with pb_frf_clear.
 typedef struct pb_frf {
   size_t nf, ny, nu;
-  double *frequency_hz; // [nf] ascending
-  double complex *h;    // [nf][ny][nu] output unit per input unit
-  double *coherence;    // [nf][ny] multiple coherence, 0 … 1
-  double *variance;     // [nf][ny][nu] E|Ĥ − H|²; infinite where a line was not excited
-  double averages;      // effective number of independent averages
+  double *frequency_hz;  // [nf] ascending
+  double complex *h;     // [nf][ny][nu] output unit per input unit
+  double *coherence;     // [nf][ny] multiple coherence, 0 … 1
+  double *variance;      // [nf][ny][nu] E|Ĥ − H|²; infinite where a line was not excited
+  double averages;       // effective number of independent averages
 } pb_frf;
 
 // Allocates zeroed arrays of these sizes. [init] PB_ERR_ARGUMENT for a size of 0, PB_ERR_MEMORY.

@@ -19,10 +19,10 @@
 #include "signal/frf.h"
 
 typedef struct pb_periodic_options {
-  double sample_rate; // Hz
-  size_t period;      // samples
-  size_t experiments; // ≥ nu
-  double f1, f2;      // Hz, the lines that are excited
+  double sample_rate;  // Hz
+  size_t period;       // samples
+  size_t experiments;  // ≥ nu
+  double f1, f2;       // Hz, the lines that are excited
 } pb_periodic_options;
 
 typedef struct pb_periodic pb_periodic;
@@ -42,10 +42,10 @@ void pb_periodic_break(pb_periodic *periodic);
 // Whole periods so far of one experiment.
 size_t pb_periodic_count(const pb_periodic *periodic, size_t experiment);
 
-// Difference of the last and the first period of each experiment, as a response of `experiments` inputs:
-// h[nf][ny][experiments]. The steady state cancels in it; what is left is the decay of what the start
-// of the excitation set off, and noise. [init] PB_ERR_STATE when an experiment has fewer than two
-// periods, or periods that do not follow one another.
+// Difference of the last and the first period of each experiment, as a response of `experiments`
+// inputs: h[nf][ny][experiments]. The steady state cancels in it; what is left is the decay of what
+// the start of the excitation set off, and noise. [init] PB_ERR_STATE when an experiment has fewer
+// than two periods, or periods that do not follow one another.
 pb_status pb_periodic_difference(const pb_periodic *periodic, pb_frf *out, pb_error *err);
 
 // Removes from the means what free decays at given poles explain. With a transient Σ c λᵗ over the
@@ -53,9 +53,9 @@ pb_status pb_periodic_difference(const pb_periodic *periodic, pb_frf *out, pb_er
 //   T_p(f) = Σ c λ^{pN} g(f),   g = (1 − λ^N) / (1 − λ e^{−2πi f/f_s}),   D = T_{P−1} − T_0,
 // so that c follows from D by least squares over the lines, and the means lose Σ_p T_p / P.
 // The scatter becomes that of D's remainder. pole[poles]: one of each conjugate pair (Im z > 0), or
-// real, as z. *explained is the part of D's power that the poles explain; below 0.5 nothing is changed.
-// Estimates after this; pushing further periods is not possible any more. [init]
-// Fails with PB_ERR_STATE as above, PB_ERR_NUMERIC (LAPACK), PB_ERR_MEMORY.
+// real, as z. *explained is the part of D's power that the poles explain; below 0.5 nothing is
+// changed. Estimates after this; pushing further periods is not possible any more. [init] Fails
+// with PB_ERR_STATE as above, PB_ERR_NUMERIC (LAPACK), PB_ERR_MEMORY.
 pb_status pb_periodic_settle(pb_periodic *periodic, const double complex *pole, size_t poles,
                              double *explained, pb_error *err);
 

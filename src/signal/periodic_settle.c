@@ -9,7 +9,8 @@
 static pb_status check(const pb_periodic *p, pb_error *err) {
   for (size_t e = 0; e < p->options.experiments; e++) {
     if (p->count[e] < 2 || p->broken[e]) {
-      return pb_fail(err, PB_ERR_STATE, "periodic", "experiment %zu has no two periods in a row", e + 1);
+      return pb_fail(err, PB_ERR_STATE, "periodic", "experiment %zu has no two periods in a row",
+                     e + 1);
     }
   }
   return PB_OK;
@@ -22,7 +23,8 @@ pb_status pb_periodic_difference(const pb_periodic *p, pb_frf *out, pb_error *er
   if (status == PB_OK) status = pb_frf_new(p->lines, p->ny, ne, out, err);
   if (status != PB_OK) return status;
   for (size_t l = 0; l < p->lines; l++) {
-    out->frequency_hz[l] = (double)(p->first + l) * p->options.sample_rate / (double)p->options.period;
+    out->frequency_hz[l] =
+        (double)(p->first + l) * p->options.sample_rate / (double)p->options.period;
     for (size_t o = 0; o < p->ny; o++) {
       for (size_t e = 0; e < ne; e++) {
         size_t k = (e * p->ny + o) * p->lines + l;
@@ -90,7 +92,8 @@ static void fill_basis(const pb_periodic *p, const double complex *pole, size_t 
 // D of one output and experiment into d[2 lines].
 static void fill_difference(const pb_periodic *p, size_t series, double *d) {
   for (size_t l = 0; l < p->lines; l++) {
-    double complex v = p->last_period[series * p->lines + l] - p->first_period[series * p->lines + l];
+    double complex v =
+        p->last_period[series * p->lines + l] - p->first_period[series * p->lines + l];
     d[l] = creal(v);
     d[p->lines + l] = cimag(v);
   }
@@ -180,7 +183,8 @@ pb_status pb_periodic_settle(pb_periodic *p, const double complex *pole, size_t 
   if (status != PB_OK || poles == 0) return status;
   size_t n = unknowns(pole, poles), rows = 2 * p->lines, series = p->options.experiments * p->ny;
   if (n >= rows) return PB_OK;
-  double *difference = malloc(rows * n * sizeof *difference), *mean = malloc(rows * n * sizeof *mean);
+  double *difference = malloc(rows * n * sizeof *difference),
+         *mean = malloc(rows * n * sizeof *mean);
   double *c = malloc(rows * series * sizeof *c), *norm = malloc(n * sizeof *norm);
   status = difference && mean && c && norm ? PB_OK : pb_fail_memory(err, "periodic");
   if (status == PB_OK) {

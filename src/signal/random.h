@@ -12,8 +12,8 @@
 
 typedef struct pb_random {
   uint64_t s[4];
-  double spare;       // second number of the last Gaussian pair
-  uint64_t has_spare; // 0 or 1
+  double spare;        // second number of the last Gaussian pair
+  uint64_t has_spare;  // 0 or 1
 } pb_random;
 
 // Starts a generator; different streams of one seed are independent. [any]

@@ -11,19 +11,19 @@
 
 struct pb_welch {
   pb_welch_options options;
-  size_t nu, ny, signals; // signals = nu + ny, inputs first
-  size_t hop;             // samples from one segment to the next
-  size_t first, lines;    // lines kept
+  size_t nu, ny, signals;  // signals = nu + ny, inputs first
+  size_t hop;              // samples from one segment to the next
+  size_t first, lines;     // lines kept
   size_t fill, segments;
-  double *record; // [signals][length] the segment under way
-  double *window; // [length]
-  double *column; // [length]
+  double *record;  // [signals][length] the segment under way
+  double *window;  // [length]
+  double *column;  // [length]
   pb_fft fft;
-  double complex *work;     // [length]
-  double complex *spectrum; // [signals][lines] of one segment
-  double complex *suu;      // [lines][nu × nu] column-major
-  double complex *syu;      // [lines][ny × nu] column-major
-  double *syy;              // [lines][ny]
+  double complex *work;      // [length]
+  double complex *spectrum;  // [signals][lines] of one segment
+  double complex *suu;       // [lines][nu × nu] column-major
+  double complex *syu;       // [lines][ny × nu] column-major
+  double *syy;               // [lines][ny]
 };
 
 static pb_status check_options(const pb_welch_options *o, size_t nu, size_t ny, pb_error *err) {
@@ -194,9 +194,9 @@ static double effective_averages(const pb_welch *w) {
 }
 
 typedef struct line_work {
-  double complex *a; // nu × nu
-  double complex *b; // nu × (ny + nu): conj(S_yu)ᵀ, then the identity
-  double *scale;     // [nu]
+  double complex *a;  // nu × nu
+  double complex *b;  // nu × (ny + nu): conj(S_yu)ᵀ, then the identity
+  double *scale;      // [nu]
 } line_work;
 
 // H1 and its variance at line l. S_uu is scaled to a unit diagonal, for inputs of any units.

@@ -19,12 +19,12 @@
 typedef enum pb_estimator { PB_ESTIMATE_H1, PB_ESTIMATE_H2 } pb_estimator;
 
 typedef struct pb_welch_options {
-  double sample_rate; // Hz
-  size_t length;      // samples a segment; resolution = sample_rate / length
-  double overlap;     // 0 … 0.95 of a segment
+  double sample_rate;  // Hz
+  size_t length;       // samples a segment; resolution = sample_rate / length
+  double overlap;      // 0 … 0.95 of a segment
   pb_window window;
   pb_detrend detrend;
-  double f1, f2; // Hz, lines kept; both 0: all from the first above 0 to Nyquist
+  double f1, f2;  // Hz, lines kept; both 0: all from the first above 0 to Nyquist
 } pb_welch_options;
 
 typedef struct pb_welch pb_welch;

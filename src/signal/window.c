@@ -6,7 +6,7 @@
 
 typedef struct cosine_sum {
   const char *name;
-  double a[5]; // w = Σ_j a_j cos(2π j k/n)
+  double a[5];  // w = Σ_j a_j cos(2π j k/n)
 } cosine_sum;
 
 static const cosine_sum windows[] = {

@@ -1,0 +1,136 @@
+// Exact modes and zeros of the published model: see roots.h.
+#include "roots.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "model/zeros.h"
+
+pb_status pb_all_poles(const pb_model *model, pb_pole_list *out, pb_error *err) {
+  *out = (pb_pole_list){0};
+  double complex *s = malloc((model->nx + 1) * sizeof *s);
+  out->item = malloc((model->nx + 1) * sizeof *out->item);
+  pb_status status =
+      s && out->item ? pb_model_poles(model, PB_CONTINUOUS, s, err) : pb_fail_memory(err, "poles");
+  for (size_t k = 0; k < model->nx && status == PB_OK; k++) {
+    if (cimag(s[k]) < 0) continue;
+    // From s, not from z: above Nyquist z is another mode's.
+    double size = cabs(s[k]);
+    out->item[out->count++] = (pb_pole){.z = cexp(s[k] / model->sample_rate),
+                                        .hz = size / (2 * M_PI),
+                                        .damping = size > 0 ? -creal(s[k]) / size : 0};
+  }
+  free(s);
+  if (status != PB_OK) pb_pole_list_clear(out);
+  return status;
+}
+
+pb_status pb_exact_modes(const pb_model *model, double f1, double f2, pb_pole_list *out,
+                         pb_error *err) {
+  pb_status status = pb_all_poles(model, out, err);
+  if (status != PB_OK) return status;
+  size_t kept = 0;
+  for (size_t k = 0; k < out->count; k++) {
+    const pb_pole p = out->item[k];
+    if (p.damping < 1 && p.hz >= f1 && p.hz <= f2) out->item[kept++] = p;
+  }
+  out->count = kept;
+  pb_pole_sort(out->item, kept);
+  return PB_OK;
+}
+
+double pb_settling_time(const pb_pole_list *poles, double sample_rate, double f1, double level,
+                        double longest) {
+  double slowest = 0;
+  for (size_t k = 0; k < poles->count; k++) {
+    const pb_pole p = poles->item[k];
+    if (p.hz < f1 / 4) continue;
+    double decay = -log(cabs(p.z)) * sample_rate;  // 1/s
+    double time = decay > 0 ? log(1 / level) / decay : longest;
+    slowest = fmax(slowest, fmin(time, longest));
+  }
+  return slowest;
+}
+
+// The model with one input and one output only; shares all other arrays.
+static pb_model one_channel(const pb_model *m, size_t output, size_t input, double *c, double *d) {
+  pb_model one = *m;
+  one.nu = one.ny = 1;
+  one.b = m->b + input * m->nx;
+  one.bd = m->bd + input * m->nx;
+  for (size_t k = 0; k < m->nx; k++) c[k] = m->c[output + k * m->ny];
+  one.c = c;
+  *d = m->d[output + input * m->ny];
+  one.d = d;
+  return one;
+}
+
+static bool newton(const pb_model *one, double complex *z) {
+  for (int it = 0; it < 60; it++) {
+    double complex h, dh;
+    pb_model_evaluate(one, PB_SAMPLED, *z, &h, &dh);
+    double complex step = h / dh;
+    double size = cabs(step), limit = 0.1 * cabs(*z - 1);
+    if (!isfinite(size)) return false;
+    if (size > limit) step *= limit / size;
+    *z -= step;
+    if (size < 1e-13) return true;
+  }
+  return false;
+}
+
+// A zero on a pole: a mode that the channel does not see, or hardly.
+static bool cancels(const pb_pole_list *poles, double complex s, double rate) {
+  for (size_t k = 0; k < poles->count; k++) {
+    double complex p = pb_pole_s(poles->item[k].z, rate);
+    if (cabs(s - p) < 1e-4 * cabs(p)) return true;
+  }
+  return false;
+}
+
+pb_status pb_exact_zeros(const pb_model *model, size_t output, size_t input, double f1, double f2,
+                         pb_exact_zero **zero, size_t *count, pb_error *err) {
+  *zero = NULL;
+  *count = 0;
+  double complex *s = NULL;
+  size_t found = 0;
+  pb_pole_list poles = {0};
+  double d, *c = malloc((model->nx + 1) * sizeof *c);
+  pb_status status = c ? pb_model_zeros(model, &input, &output, 1, 1.2 * f2, &s, &found, err)
+                       : pb_fail_memory(err, "zeros");
+  if (status == PB_OK) status = pb_exact_modes(model, f1, f2, &poles, err);
+  if (status == PB_OK) {
+    *zero = malloc((found + 1) * sizeof **zero);
+    if (!*zero) status = pb_fail_memory(err, "zeros");
+  }
+  pb_model one = c ? one_channel(model, output, input, c, &d) : (pb_model){0};
+  for (size_t k = 0; k < found && status == PB_OK; k++) {
+    double size = cabs(s[k]), hz = size / (2 * M_PI);
+    double complex z = cexp(s[k] / model->sample_rate);
+    if (cimag(s[k]) < 0 || hz < f1 || hz > f2) continue;
+    if (cancels(&poles, s[k], model->sample_rate) || !newton(&one, &z)) continue;
+    (*zero)[(*count)++] =
+        (pb_exact_zero){pb_pole_from_z(z, model->sample_rate), {z, hz, -creal(s[k]) / size}};
+  }
+  pb_pole_list_clear(&poles);
+  free(s);
+  free(c);
+  return status;
+}
+
+int pb_sensor_of(const pb_model *model, size_t input) {
+  static const char *const pair[][2] = {{"Va", "Vs"}, {"f", "fm"}};
+  const char *name = model->input[input].name;
+  for (size_t k = 0; k < sizeof pair / sizeof *pair; k++) {
+    size_t length = strlen(pair[k][0]);
+    if (strncmp(name, pair[k][0], length) != 0) continue;
+    char sensor[128];
+    int written = snprintf(sensor, sizeof sensor, "%s%s", pair[k][1], name + length);
+    if (written < 0 || (size_t)written >= sizeof sensor) continue;
+    int output = pb_model_output(model, sensor);
+    if (output >= 0) return output;
+  }
+  return -1;
+}

@@ -1,0 +1,37 @@
+// What the published model says exactly about the channels of an experiment: modes, zeros, how long
+// transients last, and which outputs belong to which actuators.
+#ifndef PB_IDENTIFY_ROOTS_H
+#define PB_IDENTIFY_ROOTS_H
+
+#include "control/poles.h"
+#include "model/model.h"
+
+// Oscillatory poles (damping < 1) with f1 ≤ |s|/2π ≤ f2, upper half plane, of the sampled model;
+// their s is that of the continuous one. *out is the caller's. [init]
+pb_status pb_exact_modes(const pb_model *model, double f1, double f2, pb_pole_list *out,
+                         pb_error *err);
+
+// A zero of the sampled response of one channel, and the one of the continuous plant it belongs to.
+typedef struct pb_exact_zero {
+  pb_pole sampled, continuous;
+} pb_exact_zero;
+
+// Zeros with f1 ≤ |s|/2π ≤ f2 of the channel, the sampled ones by Newton's method on the exact
+// response from the continuous ones. Zeros that cancel a pole (a mode the channel does not see) are
+// left out. *zero [*count] is the caller's. [init]
+pb_status pb_exact_zeros(const pb_model *model, size_t output, size_t input, double f1, double f2,
+                         pb_exact_zero **zero, size_t *count, pb_error *err);
+
+// Seconds until every pole from f1/4 Hz on has fallen to `level`, at most `longest`. Poles given as
+// z.
+double pb_settling_time(const pb_pole_list *poles, double sample_rate, double f1, double level,
+                        double longest);
+
+// All poles of the model, for pb_settling_time. [init]
+pb_status pb_all_poles(const pb_model *model, pb_pole_list *out, pb_error *err);
+
+// The force-sensor output that belongs to an actuator's input by name: Va… with Vs…, f… with fm…,
+// the rest of the name equal. −1: none. [any]
+int pb_sensor_of(const pb_model *model, size_t input);
+
+#endif

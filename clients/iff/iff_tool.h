@@ -1,0 +1,95 @@
+// plantbus-iff: what its files share.
+#ifndef PB_IFF_TOOL_H
+#define PB_IFF_TOOL_H
+
+#include "analysis.h"
+#include "bench.h"
+#include "control/iff.h"
+#include "control/rootlocus.h"
+#include "excite_options.h"
+
+// The command line.
+typedef struct iff_options {
+  pb_common_options common;
+  pb_excite_options excite;
+  pb_name_list inputs, outputs;  // of the loops, paired in order; empty: found by name
+  uint64_t strut;                // 1 …: this loop only of those found; 0: all
+  bool gain_given;               // else the best is sought
+  double gain;
+  double integrator_hz, highpass_hz;  // corners; 0: those of eq. 1.4
+  double sign;
+  int delay;            // samples; −1: as the mode has it
+  bool skip_open_loop;  // do not measure the undamped plant
+  bool force;           // close a loop that is predicted to be unstable
+  const char *output_dir;
+  bool json, plot;
+} iff_options;
+
+// The loops: output[k] of the model through K_IFF to input[k].
+typedef struct iff_loops {
+  size_t count;
+  size_t *input, *output;  // [count]
+} iff_loops;
+
+// One mode through the experiment. hz is NaN where something was not measured or not found.
+typedef struct iff_mode {
+  pb_pole open_exact, open_measured;
+  pb_pole closed_predicted, closed_measured;
+} iff_mode;
+
+// A measured response with the prediction beside it.
+typedef struct iff_measurement {
+  pb_frf frf;                // nf == 0: not measured
+  double complex *expected;  // [nf][outputs][inputs]
+  pb_agreement agreement;    // over all outputs
+  pb_fit fit;
+  pb_run_report report;
+} iff_measurement;
+
+typedef struct iff_result {
+  const iff_options *options;
+  const pb_bench *bench;
+  const pb_model *model;
+  iff_loops loops;
+  pb_experiment_channels channels;   // inputs of the loops, all outputs
+  pb_experiment_options experiment;  // as run, defaults filled in
+  pb_iff law;                        // with the gain that was used
+  pb_lti controller;                 // of unit gain, discrete, a channel a loop
+  pb_lti controller_used;            // with the gain
+  pb_loop loop;
+  pb_loop_solver *solver;
+  bool searched;      // the gain is the best one found
+  pb_best_gain best;  // when searched
+  bool stable;
+  pb_pole worst;       // closed-loop pole of the largest |z|
+  pb_rootlocus locus;  // gains around the chosen one
+  size_t chosen;       // its index in locus.gain
+  size_t modes;
+  iff_mode *mode;  // [modes] of the band
+  iff_measurement open, closed;
+} iff_result;
+
+// Which loops are meant (by names, or every actuator with its sensor). [init]
+// PB_ERR_REFERENCE, PB_ERR_ARGUMENT say what does not fit; PB_ERR_STATE: no actuator has a sensor.
+pb_status iff_choose_loops(const pb_model *model, const iff_options *options, iff_loops *out,
+                           pb_error *err);
+void iff_loops_clear(iff_loops *loops);
+
+// Controller, gain, stability, root locus, modes: everything before the experiment. [init]
+pb_status iff_design(iff_result *result, pb_error *err);
+
+// Both runs over the bus, then the estimates and the fits. [init]
+pb_status iff_measure(iff_result *result, pb_bench *bench, pb_error *err);
+
+pb_status iff_print(const iff_result *result, pb_error *err);
+pb_status iff_print_json(const iff_result *result, pb_error *err);
+
+// iff.mat, iff-damped.csv, iff-undamped.csv, iff-root-locus.csv in a directory.
+pb_status iff_save(const iff_result *result, const char *dir, pb_error *err);
+
+// iff-root-locus.png, iff-INPUT-OUTPUT.png: damped against undamped.
+pb_status iff_plot(const iff_result *result, const char *dir, pb_error *err);
+
+void iff_result_clear(iff_result *result);
+
+#endif
