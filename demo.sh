@@ -39,11 +39,17 @@ trap 'exit 130' INT
 trap 'exit 143' TERM
 
 echo
-build/bin/plantbusd --plant "$plant" --domain $domain &
+build/bin/plantbusd --plant "$plant" --domain $domain >out/plantbusd.log &
 daemon=$!
-echo "== identification: band-limited noise over the bus"
+until grep -s ready out/plantbusd.log; do
+  kill -0 "$daemon" 2>/dev/null || { daemon=""; echo "demo.sh: the daemon did not start" >&2; exit 1; }
+  sleep 0.1
+done
+echo
+echo "== identification: band-limited noise over the bus, first input"
+input=$(build/bin/plantbus-model info --json "$plant" | sed -n 's/.*"inputs": *\["\([^"]*\)".*/\1/p')
 build/bin/plantbus-identify --domain $domain --excitation noise --band 5,500 --resolution 0.25 \
-  --averages 12 --plot -o out
+  --input "$input" --averages 16 --plot -o out
 echo
 echo "== integral force feedback, at the gain with the most damping"
 build/bin/plantbus-iff --domain $domain --gain auto --plot -o out
