@@ -6,7 +6,7 @@
 #include "control/lti_ops.h"
 #include "iff_tool.h"
 
-enum { BELOW = 40, ABOVE = 20 };  // gains of the root locus on either side of the chosen one
+enum { BELOW = 90, ABOVE = 45 };  // gains of the root locus on either side of the chosen one
 
 static pb_status make_controller(iff_result *r, pb_error *err) {
   const iff_options *o = r->options;
