@@ -46,10 +46,10 @@ until grep -s ready out/plantbusd.log; do
   sleep 0.1
 done
 echo
-echo "== identification: band-limited noise over the bus, first input"
+echo "== identification: band-limited noise over the bus, repeated so that nothing leaks"
 input=$(build/bin/plantbus-model info --json "$plant" | sed -n 's/.*"inputs": *\["\([^"]*\)".*/\1/p')
-build/bin/plantbus-identify --domain $domain --excitation noise --band 5,500 --resolution 0.25 \
-  --input "$input" --averages 16 --plot -o out
+build/bin/plantbus-identify --domain $domain --excitation periodic-noise --band 1,500 \
+  --resolution 0.25 --input "$input" --plot -o out
 echo
 echo "== integral force feedback, at the gain with the most damping"
 build/bin/plantbus-iff --domain $domain --gain auto --plot -o out

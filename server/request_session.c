@@ -143,8 +143,10 @@ pb_status pb_request_ping(pb_daemon *d, pb_request *request, pb_error *err) {
   const uint32_t epoch = d->engine.epoch;
   const pb_drive drive = d->engine.drive;
   const uint64_t event = d->engine.events_made;
+  const uint32_t members = pb_engine_member_count(&d->engine);
   pthread_mutex_unlock(&d->lock);
-  if (!cJSON_AddNumberToObject(request->result, "step", (double)step) ||
+  if (!cJSON_AddNumberToObject(request->result, "members", members) ||
+      !cJSON_AddNumberToObject(request->result, "step", (double)step) ||
       !cJSON_AddNumberToObject(request->result, "epoch", epoch) ||
       !cJSON_AddNumberToObject(request->result, "event", (double)event) ||
       !cJSON_AddStringToObject(request->result, "mode", pb_drive_name(drive)))

@@ -6,15 +6,30 @@
 
 static const int64_t settle_ns = 100000000;  // to hear of other plants, when none is named
 
-// Takes what is there; keeps the first that is wanted. *other: a second name was seen.
-static void descriptions_take(pb_session *s, dds_entity_t reader, const char *plant, char *other) {
+static uint32_t partners(dds_entity_t entity, bool writer) {
+  dds_publication_matched_status_t p = {0};
+  dds_subscription_matched_status_t q = {0};
+  if (writer) {
+    dds_get_publication_matched_status(entity, &p);
+    return p.current_count;
+  }
+  dds_get_subscription_matched_status(entity, &q);
+  return q.current_count;
+}
+
+// Takes what is there and counts it; keeps the first that is wanted. *other: a second name was
+// seen.
+static uint32_t descriptions_take(pb_session *s, dds_entity_t reader, const char *plant,
+                                  char *other) {
+  uint32_t taken = 0;
   for (;;) {
     plantbus_PlantDescription *d = plantbus_PlantDescription__alloc();
-    if (!d) return;
+    if (!d) return taken;
     memset(d, 0, sizeof *d);
     void *sample[1] = {d};
     dds_sample_info_t info;
     const dds_return_t n = dds_take(reader, sample, &info, 1, 1);
+    taken += n == 1 && info.valid_data;
     if (n == 1 && info.valid_data && (!plant || strcmp(d->name, plant) == 0)) {
       if (!s->received) {
         s->received = d;
@@ -23,27 +38,35 @@ static void descriptions_take(pb_session *s, dds_entity_t reader, const char *pl
       if (strcmp(d->name, s->received->name) != 0) snprintf(other, 65, "%s", d->name);
     }
     plantbus_PlantDescription_free(d, DDS_FREE_ALL);
-    if (n != 1) return;
+    if (n != 1) return taken;
   }
+}
+
+// When no plant is named, the time to hear of others must be over, and every daemon that was heard
+// of must have told its plant: a large description takes longer than a small one.
+static bool all_heard(dds_entity_t reader, uint32_t taken, int64_t settled) {
+  return pb_session_clock() >= settled && taken >= partners(reader, false);
 }
 
 static pb_status description_wait(pb_session *s, dds_entity_t reader, const char *plant,
                                   pb_error *err) {
   char other[65] = "";
-  int64_t deadline = pb_session_clock() + (int64_t)(s->timeout * 1e9);
+  const int64_t deadline = pb_session_clock() + (int64_t)(s->timeout * 1e9);
   const dds_entity_t waitset = dds_create_waitset(s->participant);
   const dds_entity_t condition = dds_create_readcondition(reader, DDS_ANY_STATE);
   dds_waitset_attach(waitset, condition, 0);
-  bool settling = false;
+  int64_t settled = 0;
+  uint32_t taken = 0;
   for (;;) {
     const int64_t now = pb_session_clock();
+    const int64_t until = settled > now ? settled : deadline;
     if (now >= deadline) break;
-    dds_waitset_wait(waitset, NULL, 0, deadline - now);
-    descriptions_take(s, reader, plant, other);
+    dds_waitset_wait(waitset, NULL, 0, (until < deadline ? until : deadline) - now);
+    taken += descriptions_take(s, reader, plant, other);
     if (!s->received) continue;
     if (plant || other[0]) break;
-    if (!settling) deadline = pb_session_clock() + settle_ns;
-    settling = true;
+    if (settled == 0) settled = pb_session_clock() + settle_ns;
+    if (all_heard(reader, taken, settled)) break;
   }
   dds_delete(waitset);
   dds_delete(condition);
@@ -65,17 +88,6 @@ pb_status pb_session_find(pb_session *s, const char *plant, pb_error *err) {
                                 : description_wait(s, reader, plant, err);
   dds_delete(subscriber);
   return status;
-}
-
-static uint32_t partners(dds_entity_t entity, bool writer) {
-  dds_publication_matched_status_t p = {0};
-  dds_subscription_matched_status_t q = {0};
-  if (writer) {
-    dds_get_publication_matched_status(entity, &p);
-    return p.current_count;
-  }
-  dds_get_subscription_matched_status(entity, &q);
-  return q.current_count;
 }
 
 pb_status pb_session_match(pb_session *s, dds_entity_t entity, bool writer, bool only,

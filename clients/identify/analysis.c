@@ -37,8 +37,8 @@ pb_status pb_exact_responses(const pb_model *model, const pb_experiment_channels
   return status;
 }
 
-// The largest response of output o at line f: with several inputs at once, what their orthogonality and
-// the taken-out decay leave of it hides responses that are far smaller.
+// The largest response of output o at line f: with several inputs at once, what their orthogonality
+// and the taken-out decay leave of it hides responses that are far smaller.
 static double largest_of_line(const pb_frf *frf, const double complex *exact, size_t f, size_t o) {
   double largest = 0;
   for (size_t i = 0; i < frf->nu; i++)
@@ -136,11 +136,12 @@ size_t pb_fit_channels(const pb_frf *frf, pb_fit_channel *channel, size_t most) 
   return count;
 }
 
-// The nearest fitted root, or one of NaN when it is more than a tenth of |s| away.
+// The fitted root nearest to an exact one, or NaN when it is too far to be meant.
 static pb_pole nearest(const pb_pole *pole, size_t count, pb_pole wanted, double rate) {
   const pb_pole *p = pb_pole_nearest(pole, count, wanted, rate);
   double complex s = pb_pole_s(wanted.z, rate);
-  if (p && cabs(pb_pole_s(p->z, rate) - s) < 0.1 * cabs(s)) return *p;
+  double reach = (0.005 + 0.3 * fabs(wanted.damping)) * cabs(s);
+  if (p && cabs(pb_pole_s(p->z, rate) - s) < reach) return *p;
   return (pb_pole){.z = NAN, .hz = NAN, .damping = NAN};
 }
 

@@ -8,8 +8,8 @@
 #include "roots.h"
 
 // Agreement of one output's responses with the exact ones, over the lines where its coherence
-// exceeds 0.99 and the response its noise floor: three standard deviations of the estimate, and 1e-5 of
-// the largest response of the output at that line.
+// exceeds 0.99 and the response its noise floor: three standard deviations of the estimate, and
+// 1e-5 of the largest response of the output at that line.
 typedef struct pb_agreement {
   size_t used, lines;        // entries compared, entries there are (lines × inputs)
   double magnitude_percent;  // largest error

@@ -7,7 +7,7 @@
 #include "base/json.h"
 #include "interrupt.h"
 
-// Whether anyone else is attached; a daemon that does not tell is taken to serve this client alone.
+// Whether anyone else is attached.
 static pb_status others_attached(pb_session *session, bool *others, pb_error *err) {
   char *result = NULL;
   cJSON *json = NULL;

@@ -335,7 +335,17 @@ pb_status pb_experiment_estimate(pb_experiment *e, pb_frf *out, pb_error *err) {
     e->settled = status == PB_OK;
   }
   if (status != PB_OK) return status;
-  if (e->averages) return pb_periodic_estimate(e->averages, out, err);
+  if (e->averages) {
+    status = pb_periodic_estimate(e->averages, out, err);
+    if (status == PB_ERR_STATE && e->trouble.gaps > 0) {
+      return pb_fail(
+          err, status, "experiment",
+          "%llu steps were missed, so that no two whole periods are left: run the plant slower, "
+          "or in lockstep",
+          (unsigned long long)e->trouble.gaps);
+    }
+    return status;
+  }
   if (e->welches == 1) return pb_welch_estimate(e->welch[0], e->options.estimator, out, err);
   *out = (pb_frf){0};
   return merge_columns(e, out, err);

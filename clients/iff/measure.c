@@ -103,13 +103,15 @@ static pb_status evaluate(const iff_result *r, pb_experiment *experiment, bool c
   return pb_fit_frf(&m->frf, channel, channels, &options, &m->fit, err);
 }
 
-// The fitted pole nearest to a wanted one, unless it is far away.
+// The fitted pole nearest to a predicted one, unless it is too far to be meant: a mode that the
+// loops do not reach does not show in the measurement.
 static pb_pole found(const pb_fit *fit, pb_pole wanted, double rate) {
   const pb_pole unknown = {.z = NAN, .hz = NAN, .damping = NAN};
   if (isnan(wanted.hz)) return unknown;
   const pb_pole *p = pb_pole_nearest(fit->pole, fit->poles, wanted, rate);
   double complex s = pb_pole_s(wanted.z, rate);
-  return p && cabs(pb_pole_s(p->z, rate) - s) < 0.2 * cabs(s) ? *p : unknown;
+  double reach = (0.005 + 0.3 * fabs(wanted.damping)) * cabs(s);
+  return p && cabs(pb_pole_s(p->z, rate) - s) < reach ? *p : unknown;
 }
 
 static pb_status run_both(iff_result *r, pb_bench *bench, pb_experiment *open,

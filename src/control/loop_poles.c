@@ -372,7 +372,8 @@ pb_status pb_loop_solver_polish(pb_loop_solver *s, double gain, pb_pole *pole, s
     double complex z = pole[i].z;
     double last = newton(s, gain, &z);
     if (fabs(cimag(z)) < 1e-12 * cabs(z)) z = creal(z);
-    bool good = has_converged(z, last) && cimag(z) >= 0;
+    if (cimag(z) < 0) z = conj(z);
+    bool good = has_converged(z, last);
     pole[i] = good ? pb_pole_from_z(z, s->loop.model->sample_rate)
                    : (pb_pole){.z = NAN, .hz = NAN, .damping = NAN};
   }

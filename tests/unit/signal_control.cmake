@@ -5,3 +5,6 @@ pb_test(spectrum LABELS unit SOURCES test_spectrum.c)
 pb_test(lti LABELS unit SOURCES test_lti.c)
 pb_test(loop LABELS unit SOURCES test_loop.c)
 pb_test(fit LABELS unit SOURCES test_fit.c)
+
+# Experiments of plantbus-identify and plantbus-iff, on a plant stepped in the test.
+pb_test(experiment LABELS unit SOURCES test_experiment.c fake_session.c LIBS plantbus_experiment)
