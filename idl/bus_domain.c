@@ -2,12 +2,17 @@
 // DDS 0.10.2: lost packets are asked for again at once (the default waits 100 ms), heartbeats come
 // every 2 to 20 ms, a dead host is given up after 3 s. A description of 2100 states is close to
 // 1 MB: MaxSampleSize admits 8 MiB and the writer's high-water mark lies above it, so that a
-// description that a stopped reader has not acknowledged does not hold the next one back.
+// description that a stopped reader has not acknowledged does not hold the next one back. There is
+// no Tracing element: with any verbosity, the middleware opens cyclonedds.log in the working
+// directory and refuses to start where it cannot. Warnings and errors reach the log (bus_log.h)
+// without it.
 #include "bus_domain.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "bus_log.h"
 
@@ -21,7 +26,6 @@ static const char builtin_format[] =
     "<MaxSampleSize>8 MiB</MaxSampleSize>"
     "<WriterLingerDuration>50 ms</WriterLingerDuration>"
     "<Watermarks><WhcHigh>32 MiB</WhcHigh><WhcHighInit>32 MiB</WhcHighInit></Watermarks></Internal>"
-    "<Tracing><Verbosity>warning</Verbosity></Tracing>"
     "</Domain></CycloneDDS>";
 
 void pb_domain_config(const char *interface, char *text, size_t size) {
@@ -39,12 +43,24 @@ static bool environment_configures(void) {
   return uri && *uri;
 }
 
+// The middleware takes what it cannot read for an empty configuration, which would open the plant
+// to every network of the host; and a list of files at each comma.
+static pb_status config_check(const char *name, pb_error *err) {
+  struct stat file;
+  if (access(name, R_OK) != 0 || stat(name, &file) != 0)
+    return pb_fail(err, PB_ERR_IO, name, "cannot be read");
+  if (!S_ISREG(file.st_mode) || file.st_size == 0)
+    return pb_fail(err, PB_ERR_IO, name, "is not a file with a configuration");
+  if (strchr(name, ','))
+    return pb_fail(err, PB_ERR_ARGUMENT, name, "the name of a configuration holds no comma");
+  return PB_OK;
+}
+
 static pb_status domain_create(const pb_domain_options *options, pb_error *err) {
   char text[2048];
   if (options->config) {
-    FILE *file = fopen(options->config, "r");
-    if (!file) return pb_fail(err, PB_ERR_IO, options->config, "cannot be read");
-    fclose(file);
+    pb_status status = config_check(options->config, err);
+    if (status) return status;
     if ((size_t)snprintf(text, sizeof text, "file://%s", options->config) >= sizeof text)
       return pb_fail(err, PB_ERR_ARGUMENT, options->config, "the file name is too long");
   } else if (!options->interface && environment_configures()) {

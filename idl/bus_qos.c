@@ -103,5 +103,7 @@ dds_entity_t pb_reader_create(dds_entity_t subscriber, dds_entity_t topic_entity
 
 bool pb_plant_name_valid(const char *name) {
   const size_t length = strlen(name);
+  for (size_t i = 0; i < length; i++)
+    if ((unsigned char)name[i] < ' ' || name[i] == 0x7f) return false;
   return length > 0 && length <= 64 && strpbrk(name, "*?[]") == NULL;
 }

@@ -40,7 +40,8 @@ dds_entity_t pb_writer_create(dds_entity_t publisher, dds_entity_t topic_entity,
 dds_entity_t pb_reader_create(dds_entity_t subscriber, dds_entity_t topic_entity, pb_topic topic,
                               int depth, const dds_listener_t *listener);
 
-// True when a plant's name can be a partition: no wildcard, not empty, at most 64 characters. [any]
+// True when a plant's name can be a partition: no wildcard, no control character, 1 to 64
+// octets. [any]
 bool pb_plant_name_valid(const char *name);
 
 #endif

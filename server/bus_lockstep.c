@@ -79,10 +79,15 @@ static bool command_judge(pb_daemon *d, const plantbus_Command *c, dds_instance_
   return verdict == PB_VERDICT_ACCEPTED || verdict == PB_VERDICT_LATE;
 }
 
-// No writer is left for the session: unregistered, dead, or silent beyond its liveliness.
-static void command_over(pb_daemon *d, uint64_t session) {
+// No writer is left for the session (unregistered, dead, or silent beyond its liveliness), or its
+// own writer disposed of it. A disposal by anybody else, or the end of writers that were never its
+// own, is not the end of the session.
+static void command_over(pb_daemon *d, uint64_t session, const dds_sample_info_t *info) {
   pb_member *member = pb_engine_find(&d->engine, session);
-  if (!member) return;
+  if (!member || member->writer == 0) return;
+  if (info->instance_state != DDS_IST_NOT_ALIVE_NO_WRITERS &&
+      (info->valid_data || info->publication_handle != member->writer))
+    return;
   char why[160];
   if (pb_engine_waiting(&d->engine) && member->barrier && !member->in)
     snprintf(why, sizeof why, "was late at step %llu: it gives no sign of life",
@@ -104,8 +109,10 @@ bool pb_bus_take_commands(pb_daemon *d, uint64_t *for_step) {
         accepted = true;
         if (for_step) *for_step = command.step ? command.step : UINT64_MAX;
       }
-    } else if (info.instance_state != DDS_IST_ALIVE) {
-      command_over(d, command.session);
+    }
+    // Told with the last command when that was still here.
+    if (info.instance_state != DDS_IST_ALIVE) {
+      command_over(d, command.session, &info);
       accepted = true;  // the inputs may have changed
     }
   }
@@ -118,7 +125,8 @@ void pb_bus_on_command(dds_entity_t reader, void *context) {
   pthread_mutex_lock(&d->lock);
   const uint64_t events = d->engine.events_made;
   bool more = false;
-  if (d->listening) {
+  // Looked at again: the mode may have changed while this thread waited for the lock.
+  if (d->listening && !atomic_load_explicit(&d->realtime_mode, memory_order_relaxed)) {
     pb_bus_take_commands(d, NULL);
     more = pb_bus_run_ready(d);
   }

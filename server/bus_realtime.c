@@ -7,8 +7,8 @@
 #include "daemon.h"
 
 // Under lock: what acts now goes to the step thread; when its ring is full, with the next record.
-static void inputs_send(pb_daemon *d, uint64_t for_step) {
-  pb_held_input input = {.for_step = for_step};
+static void inputs_send(pb_daemon *d, uint64_t for_step, bool counted) {
+  pb_held_input input = {.for_step = for_step, .counted = counted};
   bool held;
   pb_engine_input(&d->engine, input.u, &held);
   d->input_owed = !pb_realtime_input(&d->realtime, &input);
@@ -27,7 +27,9 @@ static void *receive_run(void *context) {
     if (stop) break;
     pthread_mutex_lock(&d->lock);
     uint64_t for_step = UINT64_MAX;
-    if (pb_bus_take_commands(d, &for_step)) inputs_send(d, for_step);
+    const uint64_t late = d->engine.verdicts[PB_VERDICT_LATE];
+    if (pb_bus_take_commands(d, &for_step))
+      inputs_send(d, for_step, d->engine.verdicts[PB_VERDICT_LATE] != late);
     pthread_mutex_unlock(&d->lock);
   }
   dds_delete(condition);
@@ -43,7 +45,7 @@ static void record_publish(pb_daemon *d, const pb_record *record) {
   d->current = *record;
   if (held) d->current.flags |= PB_FLAG_HELD;
   if (pb_engine_advance(&d->engine, record->step, pb_daemon_clock()) || d->input_owed)
-    inputs_send(d, UINT64_MAX);
+    inputs_send(d, UINT64_MAX, false);
   pb_bus_note_faults(d, &d->current);
   if (record->step % d->engine.decimation == 0) pb_bus_publish_sample(d);
   pthread_mutex_unlock(&d->lock);
@@ -104,6 +106,8 @@ void pb_bus_realtime_stop(pb_daemon *d) {
     pthread_join(d->receive_thread, NULL);
     d->realtime_threads = false;
   }
+  // When the ring was full the last records are lost; the plant is where the stepper is.
+  if (d->stepper.now.step > d->engine.step) record_publish(d, &d->stepper.now);
   pthread_mutex_lock(&d->lock);
   atomic_store_explicit(&d->realtime_mode, false, memory_order_release);
   pb_bus_take_commands(d, NULL);  // what came while the threads ended

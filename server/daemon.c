@@ -29,8 +29,10 @@ static pb_status plant_load(pb_daemon *d, pb_warnings *warnings, pb_error *err) 
   cJSON_Delete(json);
   if (!status) status = pb_model_load(d->options.plant, warnings, &d->model, err);
   if (!status && !pb_plant_name_valid(d->model->name))
-    status = pb_fail(err, PB_ERR_SCHEMA, "/name",
-                     "expected 1 to 64 octets without * ? [ ], to serve as a partition");
+    status =
+        pb_fail(err, PB_ERR_SCHEMA, "/name",
+                "expected 1 to 64 octets without * ? [ ] and control characters, to serve as a "
+                "partition");
   if (!status) status = hash_text(d->plant_text, d->plant_sha256, err);
   if (!status) status = pb_model_pack(d->model, &d->packed, &d->packed_count, err);
   if (!status) status = pb_stepper_init(&d->stepper, d->model, err);
@@ -59,20 +61,26 @@ static pb_status service_start(pb_daemon *d, pb_error *err) {
   return PB_OK;
 }
 
-pb_status pb_daemon_start(pb_daemon *d, const pb_daemon_options *options, pb_warnings *warnings,
-                          pb_error *err) {
+pb_status pb_daemon_load(pb_daemon *d, const pb_daemon_options *options, pb_warnings *warnings,
+                         pb_error *err) {
   memset(d, 0, sizeof *d);
   d->options = *options;
   d->speed = options->speed;
   pthread_mutex_init(&d->lock, NULL);
   pb_status status = plant_load(d, warnings, err);
   if (!status) status = pb_realtime_init(&d->realtime, &d->stepper, err);
-  if (!status) {
-    pb_engine_init(&d->engine, (uint32_t)d->model->nu, d->model->sample_rate);
-    d->current = d->stepper.now;
-    memory_lock(d);
-    status = pb_bus_create(d, err);
+  if (status) {
+    pb_daemon_stop(d);
+    return status;
   }
+  pb_engine_init(&d->engine, (uint32_t)d->model->nu, d->model->sample_rate);
+  d->current = d->stepper.now;
+  return PB_OK;
+}
+
+pb_status pb_daemon_start(pb_daemon *d, pb_error *err) {
+  memory_lock(d);
+  pb_status status = pb_bus_create(d, err);
   if (!status) status = service_start(d, err);
   if (status) pb_daemon_stop(d);
   return status;

@@ -103,9 +103,13 @@ int64_t pb_daemon_clock(void);
 
 // --- daemon.c ---
 
-// Loads the plant, joins the domain, starts to serve. On failure everything is released. [init]
-pb_status pb_daemon_start(pb_daemon *daemon, const pb_daemon_options *options,
-                          pb_warnings *warnings, pb_error *err);
+// Loads the plant: seconds for a large one, and nothing that needs an orderly end. On failure
+// everything is released. [init]
+pb_status pb_daemon_load(pb_daemon *daemon, const pb_daemon_options *options, pb_warnings *warnings,
+                         pb_error *err);
+
+// Joins the domain and starts to serve. On failure everything is released. [init]
+pb_status pb_daemon_start(pb_daemon *daemon, pb_error *err);
 void pb_daemon_stop(pb_daemon *daemon);
 
 // --- bus_entities.c ---

@@ -27,7 +27,7 @@
 enum {
   PB_ENGINE_INPUTS = 32,   // of the plant
   PB_ENGINE_MEMBERS = 64,  // attached at once
-  PB_ENGINE_CHANNELS = 32,
+  PB_ENGINE_CHANNELS = 64,
   PB_ENGINE_EVENTS = 128,  // kept until taken; then the oldest are lost and counted
   PB_ENGINE_NAME = 64,     // octets of a name, with its terminator
 };
@@ -124,11 +124,10 @@ typedef struct pb_engine {
   pb_drive drive;
   uint32_t decimation;  // steps from one published sample to the next
   uint32_t epoch;
-  uint64_t step;       // the current step; its sample is out, its input is not yet held
-  uint64_t budget;     // steps that may be taken without lockstep ("step n")
-  int64_t step_began;  // wall clock
-  uint64_t attached;   // members ever
-  uint32_t places;     // in use: member[0 .. places), free ones among them
+  uint64_t step;      // the current step; its sample is out, its input is not yet held
+  uint64_t budget;    // steps that may be taken without lockstep ("step n")
+  uint64_t attached;  // members ever
+  uint32_t places;    // in use: member[0 .. places), free ones among them
   pb_member member[PB_ENGINE_MEMBERS];
   pb_channel channel[PB_ENGINE_CHANNELS];
   uint8_t sorted[PB_ENGINE_CHANNELS];  // used channels by name
@@ -218,7 +217,11 @@ bool pb_engine_guard(pb_engine *engine, int64_t now);
 // A new epoch: step count anew, rests gone, members stay and owe a command for `step`. [any]
 void pb_engine_restart(pb_engine *engine, uint64_t step, int64_t now);
 
-// Changes who drives; members' waiting starts anew. [any]
+// Allows n ≥ 1 steps, whoever drives; members' waiting starts anew. [any]
+void pb_engine_allow(pb_engine *engine, uint64_t n, int64_t now);
+
+// Changes who drives; members' waiting starts anew. A command that acted in real time is not an
+// answer to the sample that lockstep begins with. [any]
 void pb_engine_drive(pb_engine *engine, pb_drive drive, int64_t now);
 
 // True when a barrier member's command for this step is awaited (and the plant could go on). [any]

@@ -52,11 +52,16 @@ void pb_engine_input(const pb_engine *engine, double *u, bool *held) {
   }
 }
 
+// Nobody can speak between two published samples: a lease is as long as their distance at least.
+static uint64_t lease_of(const pb_engine *engine, const pb_member *member) {
+  return member->lease_steps > engine->decimation ? member->lease_steps : engine->decimation;
+}
+
 static bool leases_end(pb_engine *engine) {
   bool any = false;
   for (size_t i = 0; i < engine->places; i++) {
     pb_member *m = &engine->member[i];
-    if (!m->id || engine->step - m->heard_step <= m->lease_steps) continue;
+    if (!m->id || engine->step - m->heard_step <= lease_of(engine, m)) continue;
     char why[160];
     snprintf(why, sizeof why, "gave no command for its lease of %.4g s of plant time",
              (double)m->lease_steps / engine->sample_rate);
@@ -81,7 +86,6 @@ static bool ramps_run(pb_engine *engine) {
 
 bool pb_engine_advance(pb_engine *engine, uint64_t step, int64_t now) {
   engine->step = step;
-  engine->step_began = now;
   if (engine->budget > 0 && --engine->budget == 0)
     pb_engine_note(engine, PB_EVENT_STEPPED, "the steps asked for are done");
   if (barrier_step(engine)) {
@@ -120,7 +124,6 @@ static void members_wait_anew(pb_engine *engine, int64_t now) {
 void pb_engine_restart(pb_engine *engine, uint64_t step, int64_t now) {
   engine->epoch++;
   engine->step = step;
-  engine->step_began = now;
   engine->budget = 0;
   members_wait_anew(engine, now);
   for (size_t i = 0; i < engine->places; i++) {
@@ -138,7 +141,14 @@ void pb_engine_restart(pb_engine *engine, uint64_t step, int64_t now) {
   }
 }
 
+void pb_engine_allow(pb_engine *engine, uint64_t n, int64_t now) {
+  engine->budget = n;
+  for (size_t i = 0; i < engine->places; i++) engine->member[i].waiting_since = now;
+}
+
 void pb_engine_drive(pb_engine *engine, pb_drive drive, int64_t now) {
+  if (engine->drive == PB_DRIVE_REALTIME)
+    for (size_t i = 0; i < engine->places; i++) engine->member[i].in = false;
   engine->drive = drive;
   engine->budget = 0;
   members_wait_anew(engine, now);

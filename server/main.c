@@ -1,8 +1,10 @@
 // plantbusd: serves one plant until SIGINT or SIGTERM.
+#include <fcntl.h>
 #include <semaphore.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <unistd.h>
 
 #ifdef PB_HAVE_SYSTEMD
 #include <systemd/sd-daemon.h>
@@ -20,6 +22,16 @@ static void notify(const char *state) {
 #else
   (void)state;
 #endif
+}
+
+// A standard stream that was closed by whoever started the daemon would become a socket of the bus,
+// and what is printed would be sent. One whose reader has gone is no reason to end.
+static void streams_open(void) {
+  int fd;
+  signal(SIGPIPE, SIG_IGN);
+  do fd = open("/dev/null", O_RDWR);
+  while (fd >= 0 && fd <= STDERR_FILENO);
+  if (fd >= 0) close(fd);
 }
 
 static void tell_warnings(const char *plant, pb_warnings *warnings) {
@@ -51,8 +63,6 @@ static void signals_prepare(void) {
   struct sigaction action = {.sa_handler = on_end, .sa_flags = SA_RESTART};
   sigaction(SIGINT, &action, NULL);
   sigaction(SIGTERM, &action, NULL);
-  action.sa_handler = SIG_IGN;
-  sigaction(SIGPIPE, &action, NULL);
 }
 
 static void signals_mask(int how) {
@@ -73,14 +83,17 @@ int main(int argc, char **argv) {
   if (openblas_set_num_threads) openblas_set_num_threads(1);
   pb_daemon_options options;
   pb_options_parse(argc, argv, &options);
-  signals_prepare();
-  signals_mask(SIG_BLOCK);
+  streams_open();
   pb_daemon *daemon = calloc(1, sizeof *daemon);
   pb_warnings warnings = {0};
   pb_error err = {PB_OK, "", ""};
+  // Until the plant is loaded a signal ends the process at once: there is nothing to undo.
   pb_status status =
-      daemon ? pb_daemon_start(daemon, &options, &warnings, &err) : pb_fail_memory(&err, "daemon");
+      daemon ? pb_daemon_load(daemon, &options, &warnings, &err) : pb_fail_memory(&err, "daemon");
   tell_warnings(options.plant, &warnings);
+  signals_prepare();
+  signals_mask(SIG_BLOCK);
+  if (!status) status = pb_daemon_start(daemon, &err);
   if (status) {
     char text[800];
     pb_error_format(&err, text, sizeof text);

@@ -111,6 +111,8 @@ static error_t parse(int key, char *arg, struct argp_state *state) {
     return 0;
   case ARGP_KEY_END:
     if (!options->plant) argp_error(state, "--plant is missing");
+    if (options->config && options->interface)
+      argp_error(state, "--interface has no meaning with --config, which names the interface");
     return 0;
   default:
     return parse_network(key, arg, state, options);

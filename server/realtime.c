@@ -35,7 +35,7 @@ static uint32_t inputs_take(pb_realtime *rt, pb_held_input *held) {
   while (pb_ring_take(&rt->inputs, &next)) {
     *held = next;
     if (next.for_step >= rt->stepper->now.step) continue;
-    atomic_fetch_add_explicit(&rt->late, 1, memory_order_relaxed);
+    if (!next.counted) atomic_fetch_add_explicit(&rt->late, 1, memory_order_relaxed);
     flags |= PB_FLAG_LATE;
   }
   return flags;

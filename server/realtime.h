@@ -11,6 +11,7 @@
 #include <pthread.h>
 #include <semaphore.h>
 #include <stdatomic.h>
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "ring.h"
@@ -22,6 +23,7 @@ enum { PB_REALTIME_RECORDS = 1024, PB_REALTIME_INPUTS = 256 };
 // Inputs on their way to the step thread.
 typedef struct pb_held_input {
   uint64_t for_step;  // the step they were meant for; UINT64_MAX: whichever is next
+  bool counted;       // that they are late is counted already
   double u[PB_STEPPER_INPUTS];
 } pb_held_input;
 

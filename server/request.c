@@ -83,12 +83,8 @@ static void client_over(pb_daemon *d, const uint8_t client[16]) {
   dds_unregister_instance(d->reply, &key);
 }
 
-static void request_take(pb_daemon *d, const plantbus_Request *in, const dds_sample_info_t *info) {
+static void request_judge(pb_daemon *d, const plantbus_Request *in, const dds_sample_info_t *info) {
   uint8_t actual[16];
-  if (!info->valid_data) {
-    if (info->instance_state != DDS_IST_ALIVE) client_over(d, in->client);
-    return;
-  }
   if (!pb_bus_writer_is(d->request, info->publication_handle, in->client, actual)) {
     static const uint8_t nobody[16];
     pb_error err;
@@ -98,6 +94,17 @@ static void request_take(pb_daemon *d, const plantbus_Request *in, const dds_sam
     return;
   }
   if (!answered_before(d, in)) serve(d, in);
+}
+
+// The end of a client's writer is told with its last request when that was still here. Anyone may
+// dispose of its instance; only its own word counts.
+static void request_take(pb_daemon *d, const plantbus_Request *in, const dds_sample_info_t *info) {
+  uint8_t actual[16];
+  if (info->valid_data) request_judge(d, in, info);
+  if (info->instance_state == DDS_IST_NOT_ALIVE_NO_WRITERS ||
+      (!info->valid_data && info->instance_state == DDS_IST_NOT_ALIVE_DISPOSED &&
+       pb_bus_writer_is(d->request, info->publication_handle, in->client, actual)))
+    client_over(d, in->client);
 }
 
 // A bounded number at a time: whoever floods the daemon with requests does not keep it from the

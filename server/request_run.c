@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include "daemon.h"
+#include "fpenv.h"
 #include "request_body.h"
 
 static pb_status result_number(pb_request *request, const char *key, double value, pb_error *err) {
@@ -81,7 +82,7 @@ pb_status pb_request_step(pb_daemon *d, pb_request *request, pb_error *err) {
   else if (engine->budget > 0)
     status = pb_fail(err, PB_ERR_STATE, "", "the steps of an earlier request are not done yet");
   if (!status) {
-    engine->budget = (uint64_t)n;
+    pb_engine_allow(engine, (uint64_t)n, pb_daemon_clock());
     pb_bus_run_ready(d);
     request->accepted = engine->budget > 0;
   }
@@ -97,7 +98,9 @@ static pb_status restart(pb_daemon *d, pb_request *request, const pb_state *stat
   pthread_mutex_lock(&d->lock);
   pb_engine_restart(&d->engine, state ? state->step : 0, pb_daemon_clock());
   const uint32_t epoch = d->engine.epoch;
+  const uint64_t saved = pb_flush_denormals();
   pb_stepper_restart(&d->stepper, state, epoch);
+  pb_restore_denormals(saved);
   d->current = d->stepper.now;
   d->faults = 0;
   memset(d->fault_step, 0, sizeof d->fault_step);

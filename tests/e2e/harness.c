@@ -177,6 +177,36 @@ dds_entity_t e2e_raw_reader(const e2e_raw *raw, pb_topic topic) {
   return reader;
 }
 
+// The request's writer stays: its end would be the end of the client.
+uint64_t e2e_raw_attach(const e2e_raw *raw, const char *channel, const char *input) {
+  const dds_entity_t reply = e2e_raw_reader(raw, PB_TOPIC_REPLY);
+  const dds_entity_t writer = e2e_raw_writer(raw, PB_TOPIC_REQUEST);
+  const double end = clock_seconds() + E2E_CAP;
+  unsigned long long session = 0;
+  char body[256];
+  snprintf(body, sizeof body,
+           "{\"channel\":\"%s\",\"inputs\":[\"%s\"],\"guard\":60,\"name\":\"raw\"}", channel,
+           input);
+  plantbus_Request request = {.id = 1, .kind = "attach", .body = body};
+  memcpy(request.client, raw->client, sizeof request.client);
+  assert_int_equal(dds_write(writer, &request), DDS_RETCODE_OK);
+  while (session == 0) {
+    void *sample[1] = {NULL};
+    dds_sample_info_t info;
+    if (clock_seconds() > end) fail_msg("no answer to attach within %g s", E2E_CAP);
+    pause_briefly();
+    if (dds_take(reply, sample, &info, 1, 1) != 1) continue;
+    const plantbus_Reply *r = sample[0];
+    const char *at = info.valid_data && r->id == 1 && !memcmp(r->client, raw->client, 16)
+                         ? strstr(r->result, "\"session\":\"")
+                         : NULL;
+    if (at) sscanf(at, "\"session\":\"%16llx\"", &session);
+    dds_return_loan(reply, sample, 1);
+  }
+  dds_delete(reply);
+  return session;
+}
+
 plantbus_PlantStatus *e2e_status_wait(dds_entity_t reader,
                                       bool (*condition)(const plantbus_PlantStatus *)) {
   const double end = clock_seconds() + E2E_CAP;

@@ -69,6 +69,9 @@ e2e_raw e2e_raw_join(const e2e_daemon *daemon);
 dds_entity_t e2e_raw_writer(const e2e_raw *raw, pb_topic topic);
 dds_entity_t e2e_raw_reader(const e2e_raw *raw, pb_topic topic);
 
+// Attaches to a channel for one input as a barrier member with a guard of a minute; the session.
+uint64_t e2e_raw_attach(const e2e_raw *raw, const char *channel, const char *input);
+
 // The newest status for which the condition holds is copied out; fails at the cap.
 plantbus_PlantStatus *e2e_status_wait(dds_entity_t reader,
                                       bool (*condition)(const plantbus_PlantStatus *));

@@ -58,17 +58,6 @@ static void ask(probe *p, const uint8_t client[16], uint64_t id, const char *kin
   reply_wait(p, p->raw.client, id, text, size);
 }
 
-static uint64_t attach_raw(probe *p, uint64_t id) {
-  char text[512];
-  ask(p, p->raw.client, id, "attach",
-      "{\"channel\":\"raw\",\"inputs\":[\"Va\"],\"guard\":60,\"name\":\"raw\"}", text, sizeof text);
-  unsigned long long session = 0;
-  const char *at = strstr(text, "\"session\":\"");
-  assert_non_null(at);
-  assert_int_equal(sscanf(at, "\"session\":\"%16llx\"", &session), 1);
-  return session;
-}
-
 static void command(probe *p, uint64_t session, uint64_t step, uint32_t channel, uint32_t count,
                     double value) {
   const plantbus_Command c = {session, step, channel, count, {value}};
@@ -88,10 +77,18 @@ static bool at_step_2(const plantbus_PlantStatus *s) {
   return s->step == 2 && s->refused.stale >= 1;
 }
 
+static bool is_at_step_1(const plantbus_PlantStatus *s) {
+  return s->step == 1;
+}
+
+static bool is_at_step_2(const plantbus_PlantStatus *s) {
+  return s->step == 2;
+}
+
 static void bad_commands_are_counted_and_never_act(void **state) {
   (void)state;
   probe p = probe_open();
-  const uint64_t session = attach_raw(&p, 1);
+  const uint64_t session = e2e_raw_attach(&p.raw, "raw", "Va");
   command(&p, 12345, 0, 0, 1, 9.0);
   command(&p, session, 0, 7, 1, 9.0);
   command(&p, session, 3, 0, 1, 9.0);
@@ -131,7 +128,7 @@ static bool foreign_counted(const plantbus_PlantStatus *s) {
 static void a_stolen_session_is_refused(void **state) {
   (void)state;
   probe p = probe_open();
-  const uint64_t session = attach_raw(&p, 1);
+  const uint64_t session = e2e_raw_attach(&p.raw, "raw", "Va");
   const e2e_raw thief = e2e_raw_join(&p.daemon);
   const dds_entity_t writer = e2e_raw_writer(&thief, PB_TOPIC_COMMAND);
   const plantbus_Command c = {session, 0, 0, 1, {9.0}};
@@ -140,6 +137,64 @@ static void a_stolen_session_is_refused(void **state) {
   assert_int_equal(status->step, 0);
   plantbus_PlantStatus_free(status, DDS_FREE_ALL);
   dds_delete(thief.participant);
+  probe_close(&p);
+}
+
+// Whoever knows a session or a client can dispose of its instance on the bus. That is not its end.
+static void a_session_is_not_ended_by_others(void **state) {
+  (void)state;
+  probe p = probe_open();
+  const uint64_t session = e2e_raw_attach(&p.raw, "raw", "Va");
+  command(&p, session, 0, 0, 1, 1.5);
+  plantbus_PlantStatus_free(e2e_status_wait(p.status, is_at_step_1), DDS_FREE_ALL);
+  const e2e_raw thief = e2e_raw_join(&p.daemon);
+  const dds_entity_t writer = e2e_raw_writer(&thief, PB_TOPIC_COMMAND);
+  const dds_entity_t requests = e2e_raw_writer(&thief, PB_TOPIC_REQUEST);
+  const plantbus_Command c = {.session = session};
+  plantbus_Request r = {.kind = "", .body = ""};
+  memcpy(r.client, p.raw.client, sizeof r.client);
+  assert_int_equal(dds_dispose(writer, &c), DDS_RETCODE_OK);
+  assert_int_equal(dds_dispose(requests, &r), DDS_RETCODE_OK);
+  // What a stranger writes after the disposals arrives after them.
+  const plantbus_Command marker = {.session = session, .count = 1};
+  assert_int_equal(dds_write(writer, &marker), DDS_RETCODE_OK);
+  plantbus_PlantStatus_free(e2e_status_wait(p.status, foreign_counted), DDS_FREE_ALL);
+  r.id = 33;
+  assert_int_equal(dds_write(requests, &r), DDS_RETCODE_OK);
+  char text[512];
+  const dds_entity_t replies = p.reply;
+  p.reply = e2e_raw_reader(&thief, PB_TOPIC_REPLY);
+  reply_wait(&p, thief.client, 33, text, sizeof text);
+  p.reply = replies;
+  command(&p, session, 1, 0, 1, 1.5);
+  plantbus_PlantStatus *status = e2e_status_wait(p.status, is_at_step_2);
+  assert_int_equal(status->attached._length, 1);
+  plantbus_PlantStatus_free(status, DDS_FREE_ALL);
+  dds_delete(thief.participant);
+  probe_close(&p);
+}
+
+static bool nobody_attached(const plantbus_PlantStatus *s) {
+  return s->attached._length == 0;
+}
+
+// A client asks for much (each start of real time at this speed ends with a sleep of the one
+// before) and leaves: its last requests are still there when the bus says that it is gone. Its
+// session, with a long guard and lease, must not outlive it.
+static void a_client_that_leaves_behind_its_requests_is_missed(void **state) {
+  (void)state;
+  probe p = probe_open();
+  const e2e_raw raw = e2e_raw_join(&p.daemon);
+  const dds_entity_t requests = e2e_raw_writer(&raw, PB_TOPIC_REQUEST);
+  e2e_raw_attach(&raw, "raw", "Va");
+  for (uint64_t id = 2; id < 30; id++) {
+    plantbus_Request request = {
+        .id = id, .kind = "set_mode", .body = "{\"mode\":\"realtime\",\"speed\":0.001}"};
+    memcpy(request.client, raw.client, sizeof request.client);
+    assert_int_equal(dds_write(requests, &request), DDS_RETCODE_OK);
+  }
+  dds_delete(raw.participant);
+  plantbus_PlantStatus_free(e2e_status_wait(p.status, nobody_attached), DDS_FREE_ALL);
   probe_close(&p);
 }
 
@@ -214,6 +269,8 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(bad_commands_are_counted_and_never_act),
       cmocka_unit_test(a_stolen_session_is_refused),
+      cmocka_unit_test(a_session_is_not_ended_by_others),
+      cmocka_unit_test(a_client_that_leaves_behind_its_requests_is_missed),
       cmocka_unit_test(a_forged_client_is_refused),
       cmocka_unit_test(a_request_sent_twice_is_served_once),
       cmocka_unit_test(requests_are_read_strictly),

@@ -104,6 +104,72 @@ static void a_stopped_client_loses_its_lease(void **state) {
   e2e_daemon_end(&daemon);
 }
 
+// Far faster than the bus can follow: steps are left out on the bus, but when lockstep begins, what
+// it publishes and steps from is where the plant is.
+static void lockstep_begins_where_the_plant_is(void **state) {
+  (void)state;
+  e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, NULL);
+  pb_session *session = e2e_open(&daemon);
+  e2e_attach(session, "test", "Va", 0.0);
+  for (int i = 0; i < 5; i++) {
+    e2e_request(session, "set_mode", "{\"mode\":\"realtime\",\"speed\":1000}");
+    e2e_request(session, "ping", NULL);
+    e2e_request(session, "set_mode", "{\"mode\":\"lockstep\"}");
+    pb_session_detach(session);  // its lease may be over
+    e2e_attach(session, "test", "Va", 0.0);
+    watch w = {.want = 3};
+    run(session, &w, 2.0);
+    assert_int_equal(w.last, w.first + 3);
+  }
+  pb_session_close(session);
+  e2e_daemon_end(&daemon);
+}
+
+static plantbus_Sample sample_newest(dds_entity_t reader) {
+  plantbus_Sample sample = {0};
+  for (int i = 0; i < 50000; i++) {
+    void *out[1] = {&sample};
+    dds_sample_info_t info;
+    if (dds_take(reader, out, &info, 1, 1) == 1 && info.valid_data) return sample;
+    dds_sleepfor(DDS_USECS(100));
+  }
+  fail_msg("no sample");
+  return sample;
+}
+
+static bool late_counted(const plantbus_PlantStatus *s) {
+  return s->late > 0 && s->attached._length == 1 && s->attached._buffer[0].commands == 2;
+}
+
+// At ten steps a second: a command for a step that is over acts, and is late once.
+static void a_late_command_is_counted_once(void **state) {
+  (void)state;
+  const char *const slow[] = {"--mode", "realtime", "--speed", "0.001", "--lease", "1000", NULL};
+  e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, slow);
+  const e2e_raw raw = e2e_raw_join(&daemon);
+  const dds_entity_t status = e2e_raw_reader(&raw, PB_TOPIC_STATUS);
+  const dds_entity_t samples = e2e_raw_reader(&raw, PB_TOPIC_SAMPLE);
+  const dds_entity_t commands = e2e_raw_writer(&raw, PB_TOPIC_COMMAND);
+  plantbus_Command command = {.session = e2e_raw_attach(&raw, "late", "Va"), .count = 1};
+  plantbus_Sample sample;
+  do sample = sample_newest(samples);
+  while (sample.step < 4);
+  command.step = sample.step - 2;
+  command.input[0] = 3.0;
+  assert_int_equal(dds_write(commands, &command), DDS_RETCODE_OK);
+  do sample = sample_newest(samples);
+  while (sample.input[0] != 3.0);
+  assert_true(sample.flags & plantbus_FLAG_LATE);
+  command.step = 0;  // whichever is next: on time
+  assert_int_equal(dds_write(commands, &command), DDS_RETCODE_OK);
+  plantbus_PlantStatus *told = e2e_status_wait(status, late_counted);
+  assert_int_equal(told->late, 1);
+  assert_int_equal(told->attached._buffer[0].late, 1);
+  plantbus_PlantStatus_free(told, DDS_FREE_ALL);
+  dds_delete(raw.participant);
+  e2e_daemon_end(&daemon);
+}
+
 // From one mode to the other and back, with the state of the plant carried over.
 static void modes_may_change(void **state) {
   (void)state;
@@ -132,6 +198,8 @@ int main(void) {
       cmocka_unit_test(the_plant_runs_at_its_rate),
       cmocka_unit_test(the_speed_is_a_factor),
       cmocka_unit_test(a_stopped_client_loses_its_lease),
+      cmocka_unit_test(lockstep_begins_where_the_plant_is),
+      cmocka_unit_test(a_late_command_is_counted_once),
       cmocka_unit_test(modes_may_change),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

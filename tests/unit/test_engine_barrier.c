@@ -92,6 +92,36 @@ static void nobody_is_late_while_the_plant_is_paused(void **state) {
   free(r);
 }
 
+// Steps asked for after a long pause: the members have their whole guard to answer.
+static void allowed_steps_wait_anew(void **state) {
+  (void)state;
+  rig *r = rig_new();
+  rig_attach(r, 1, "a", 0);
+  pb_engine_drive(&r->engine, PB_DRIVE_PAUSED, 0);
+  pb_engine_allow(&r->engine, 1, 100 * second);
+  assert_true(pb_engine_waiting(&r->engine));
+  assert_false(pb_engine_guard(&r->engine, 101 * second));
+  assert_true(pb_engine_guard(&r->engine, 101 * second + 1));
+  free(r);
+}
+
+// What acted in real time is no answer to the sample that lockstep begins with.
+static void lockstep_begins_with_an_answer_of_its_own(void **state) {
+  (void)state;
+  rig *r = rig_new();
+  rig_attach(r, 1, "a", 0);
+  pb_engine_drive(&r->engine, PB_DRIVE_REALTIME, 0);
+  pb_engine_advance(&r->engine, 7, 0);
+  assert_int_equal(rig_command(r, 1, 5, 1.0), PB_VERDICT_LATE);
+  pb_engine_drive(&r->engine, PB_DRIVE_LOCKSTEP, 0);
+  assert_false(rig_step(r, NULL));
+  assert_int_equal(rig_command(r, 1, 7, 2.0), PB_VERDICT_ACCEPTED);
+  double u[RIG_INPUTS];
+  assert_true(rig_step(r, u));
+  assert_true(u[0] == 2.0);
+  free(r);
+}
+
 static void a_budget_steps_without_members(void **state) {
   (void)state;
   rig *r = rig_new();
@@ -133,7 +163,7 @@ static void decimation_asks_at_every_nth_step_only(void **state) {
   (void)state;
   rig *r = rig_new();
   r->engine.decimation = 4;
-  rig_attach(r, 1, "a", 0);
+  rig_attach(r, 1, "a", 0)->lease_steps = 2;  // shorter than it can answer: no reason to go
   for (uint64_t k = 0; k < 12; k += 4) {
     assert_false(rig_step(r, NULL));
     assert_int_equal(rig_command(r, 1, k, (double)k), PB_VERDICT_ACCEPTED);
@@ -183,6 +213,8 @@ int main(void) {
       cmocka_unit_test(a_late_member_is_evicted_by_name),
       cmocka_unit_test(guards_count_from_the_step_or_the_attaching),
       cmocka_unit_test(nobody_is_late_while_the_plant_is_paused),
+      cmocka_unit_test(allowed_steps_wait_anew),
+      cmocka_unit_test(lockstep_begins_with_an_answer_of_its_own),
       cmocka_unit_test(a_budget_steps_without_members),
       cmocka_unit_test(a_lease_ends_in_plant_time),
       cmocka_unit_test(decimation_asks_at_every_nth_step_only),

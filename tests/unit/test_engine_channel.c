@@ -138,45 +138,56 @@ static void a_reset_forgets_what_was_left(void **state) {
   free(r);
 }
 
-static void places_and_channels_are_bounded_and_come_back(void **state) {
+static pb_status attach_status(rig *r, const char *channel, pb_error *err) {
+  const uint32_t index = 0;
+  const pb_attach attach = {.client_name = "x",
+                            .channel = channel,
+                            .input = &index,
+                            .count = 1,
+                            .lease = 1.0,
+                            .guard = 1.0,
+                            .id = 500};
+  const pb_member *out;
+  const pb_status status = pb_engine_attach(&r->engine, &attach, 0, &out, err);
+  assert_true((out != NULL) == (status == PB_OK));
+  return status;
+}
+
+// Each member can have a channel of its own, round after round under new names.
+static void places_are_bounded_and_come_back(void **state) {
   (void)state;
   rig *r = rig_new();
   char name[8] = "c00";
   for (int round = 0; round < 3; round++) {
-    for (int i = 0; i < PB_ENGINE_CHANNELS; i++) {
+    for (int i = 0; i < PB_ENGINE_MEMBERS; i++) {
       name[1] = (char)('0' + round), name[2] = (char)('0' + i);
       rig_attach(r, (uint64_t)i + 1, name, 0);
     }
-    const uint32_t index = 0;
-    const pb_attach one_more = {.client_name = "x",
-                                .channel = "full",
-                                .input = &index,
-                                .count = 1,
-                                .lease = 1.0,
-                                .guard = 1.0,
-                                .id = 500};
-    const pb_member *out;
-    pb_error err;
-    assert_int_equal(pb_engine_attach(&r->engine, &one_more, 0, &out, &err), PB_ERR_STATE);
-    assert_string_equal(err.where, "/channel");
-    assert_null(out);
-    for (int i = 0; i < PB_ENGINE_CHANNELS; i++)
+    assert_int_equal(attach_status(r, "full", NULL), PB_ERR_STATE);
+    for (int i = 0; i < PB_ENGINE_MEMBERS; i++)
       pb_engine_drop(&r->engine, pb_engine_find(&r->engine, (uint64_t)i + 1), PB_EVENT_DETACHED,
                      "has detached");
     assert_int_equal(pb_engine_member_count(&r->engine), 0);
   }
-  for (int i = 0; i < PB_ENGINE_MEMBERS; i++) rig_attach(r, (uint64_t)i + 1, "same", 0);
-  const uint32_t index = 0;
-  const pb_attach one_more = {.client_name = "x",
-                              .channel = "same",
-                              .input = &index,
-                              .count = 1,
-                              .lease = 1.0,
-                              .guard = 1.0,
-                              .id = 500};
-  const pb_member *out;
+  free(r);
+}
+
+// A channel that holds what a member left behind is in use; under its name it can be taken again.
+static void channels_that_hold_are_in_use(void **state) {
+  (void)state;
+  rig *r = rig_new();
+  char name[8] = "c0";
+  for (int i = 0; i < PB_ENGINE_CHANNELS; i++) {
+    name[1] = (char)('0' + i);
+    pb_member *member = rig_attach(r, 1, name, 0);
+    member->silence = PB_SILENCE_HOLD;
+    assert_int_equal(rig_command(r, 1, 0, 1.0), PB_VERDICT_ACCEPTED);
+    pb_engine_drop(&r->engine, member, PB_EVENT_DETACHED, "has detached");
+  }
   pb_error err;
-  assert_int_equal(pb_engine_attach(&r->engine, &one_more, 0, &out, &err), PB_ERR_STATE);
+  assert_int_equal(attach_status(r, "full", &err), PB_ERR_STATE);
+  assert_string_equal(err.where, "/channel");
+  assert_int_equal(attach_status(r, name, &err), PB_OK);
   free(r);
 }
 
@@ -188,7 +199,8 @@ int main(void) {
       cmocka_unit_test(equal_priorities_first_come_first_served),
       cmocka_unit_test(silence_is_held_dropped_or_ramped),
       cmocka_unit_test(a_reset_forgets_what_was_left),
-      cmocka_unit_test(places_and_channels_are_bounded_and_come_back),
+      cmocka_unit_test(places_are_bounded_and_come_back),
+      cmocka_unit_test(channels_that_hold_are_in_use),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
