@@ -73,7 +73,7 @@ static pb_status plot_locus(const iff_result *r, const char *dir, pb_error *err)
   pb_status status = fill_points(r, &p, err);
   if (status == PB_OK) status = pb_output_path(dir, "iff-root-locus.png", path, sizeof path, err);
   if (status == PB_OK) {
-    snprintf(title, sizeof title, "%s: integral force feedback, %zu loops",
+    snprintf(title, sizeof title, "%s: integral force feedback, loops closed: %zu",
              r->bench->description->name, r->loops.count);
     snprintf(label, sizeof label, "g = %.4g", r->law.gain);
     double highest = 0;

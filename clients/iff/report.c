@@ -17,7 +17,7 @@ static void print_head(const iff_result *r) {
   printf("K = %g/(s + 2π·%g) · s/(s + 2π·%g)%s, delay %u samples, sign %+g\n", r->law.gain,
          r->law.integrator_hz, r->law.highpass_hz, r->searched ? " (best gain)" : "", r->loop.delay,
          r->loop.sign);
-  printf("%zu loops:", r->loops.count);
+  printf("%zu loop%s:", r->loops.count, r->loops.count == 1 ? "" : "s");
   for (size_t k = 0; k < r->loops.count; k++) {
     printf(" %s → %s", r->model->output[r->loops.output[k]].name,
            r->model->input[r->loops.input[k]].name);

@@ -126,7 +126,7 @@ typedef struct condensation {
   double *kz;       // n × nz: K Z
   double *kzz;      // nz × nz, then its factor
   double *x;        // nz × max(na, nu)
-  double *product;  // n × max(na, nu)
+  double *product;  // max(n, ny) × max(na, nu)
 } condensation;
 
 static void condensation_clear(condensation *c) {
@@ -143,12 +143,12 @@ static pb_status condensation_new(const pb_system *s, size_t nz, condensation *c
   c->n = s->n;
   c->nz = nz;
   c->na = s->n - nz;
-  size_t wide = c->na > s->nu ? c->na : s->nu;
+  size_t wide = c->na > s->nu ? c->na : s->nu, tall = c->n > s->ny ? c->n : s->ny;
   c->t = malloc((c->n * c->na + 1) * sizeof(double));
   c->kz = malloc(c->n * nz * sizeof(double));
   c->kzz = malloc(nz * nz * sizeof(double));
   c->x = malloc((nz * wide + 1) * sizeof(double));
-  c->product = malloc((c->n * wide + 1) * sizeof(double));
+  c->product = malloc((tall * wide + 1) * sizeof(double));
   bool ok = c->t && c->kz && c->kzz && c->x && c->product;
   return ok ? PB_OK : pb_fail_memory(err, "/components");
 }

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+static const size_t largest_size = 20000;  // as of one element: 3.2 GB a matrix
+
 size_t pb_component_size(const pb_component *c) {
   switch (c->type) {
   case PB_RIGID_BODY:
@@ -36,7 +38,12 @@ pb_status pb_layout_build(const pb_plant *plant, pb_layout *out, pb_error *err) 
     out->connection[i] = out->size;
     out->size += joint->super.element->size;
   }
-  return PB_OK;
+  if (out->size <= largest_size) return PB_OK;
+  pb_status st = pb_fail(err, PB_ERR_SCHEMA, "/components",
+                         "%zu coordinates, elements' modes included, are more than the %zu that dense "
+                         "matrices can serve", out->size, largest_size);
+  pb_layout_clear(out);
+  return st;
 }
 
 void pb_layout_clear(pb_layout *layout) {

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/json_scan.h"
 #include "base/text.h"
 
 void pb_json_pointer(char *out, size_t size, const char *base, const char *key) {
@@ -87,9 +88,15 @@ pb_status pb_json_parse(const char *text, size_t length, cJSON **out, pb_error *
   if (!copy) return pb_fail_memory(err, "");
   memcpy(copy, text, length);
   copy[length] = '\0';
-  const char *end = NULL;
-  cJSON *value = cJSON_ParseWithOpts(copy, &end, 0);
+  const char *end = NULL, *what;
+  cJSON *value = NULL;
   pb_status st = PB_OK;
+  const char *offence = pb_json_scan(copy, &what);
+  if (offence) {
+    st = fail_at(err, copy, offence, what);
+    goto done;
+  }
+  value = cJSON_ParseWithOpts(copy, &end, 0);
   if (!value) {
     size_t at = end >= copy && end <= copy + length ? (size_t)(end - copy) : 0;
     st = fail_at(err, copy, copy + at, "not well-formed JSON");

@@ -9,8 +9,8 @@
 #include "base/status.h"
 
 // Parses exactly one JSON value (white space around it is allowed). Refuses with PB_ERR_SYNTAX, naming
-// line and column or the JSON pointer: malformed text, trailing text, a NUL inside, duplicate keys,
-// numbers that are not finite. *out is owned by the caller (cJSON_Delete). [init]
+// line and column or the JSON pointer: malformed text, trailing text, a NUL inside (also as \u0000),
+// strings that are not UTF-8, duplicate keys, numbers that are not finite. *out is owned by the caller (cJSON_Delete). [init]
 pb_status pb_json_parse(const char *text, size_t length, cJSON **out, pb_error *err);
 
 // Reads and parses a file; errors name it. `text` (may be NULL) receives the text, owned by the caller.

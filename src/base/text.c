@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+static const size_t largest_file = (size_t)256 << 20;  // devices such as /dev/zero never end
+
 static bool text_reserve(pb_text *t, size_t more) {
   if (t->failed) return false;
   if (t->length + more + 1 <= t->capacity) return true;
@@ -66,12 +68,15 @@ pb_status pb_text_read(const char *path, char **text, size_t *length, pb_error *
   pb_text t = {0};
   char buffer[4096];
   size_t n;
-  while ((n = fread(buffer, 1, sizeof buffer, file)) > 0) pb_text_append_n(&t, buffer, n);
+  while (!t.failed && t.length <= largest_file &&
+         (n = fread(buffer, 1, sizeof buffer, file)) > 0)
+    pb_text_append_n(&t, buffer, n);
   int failed = ferror(file);
   fclose(file);
-  if (failed) {
+  if (failed || t.length > largest_file) {
     free(t.text);
-    return pb_fail(err, PB_ERR_IO, path, "cannot be read");
+    return pb_fail(err, PB_ERR_IO, path, "%s",
+                   failed ? "cannot be read" : "is larger than 256 MiB");
   }
   if (!t.failed && !t.text) pb_text_append(&t, "");
   if (t.failed) return pb_fail_memory(err, path);

@@ -16,6 +16,13 @@ static pb_status fail_convergence(const char *context, pb_error *err) {
   return pb_fail(err, PB_ERR_NUMERIC, context, "the eigenvalues of the damped plant did not converge");
 }
 
+// LAPACK takes NaN without a word, and eigenvalues that are NaN pair up with nothing.
+static bool all_finite(const double *x, size_t n) {
+  for (size_t i = 0; i < n; i++)
+    if (!isfinite(x[i])) return false;
+  return true;
+}
+
 // Eigenvectors in real form; wr, wi: eigenvalues. Destroys a.
 static pb_status eigenvectors(size_t size, double *a, double *v, double *wr, double *wi,
                               const char *context, pb_error *err) {
@@ -27,7 +34,8 @@ static pb_status eigenvectors(size_t size, double *a, double *v, double *wr, dou
   if (!work) return pb_fail_memory(err, context);
   dgeev_("N", "V", &n, a, &n, wr, wi, &none, &one, v, &n, work, &lwork, &info);
   free(work);
-  return info ? fail_convergence(context, err) : PB_OK;
+  bool ok = info == 0 && all_finite(wr, size) && all_finite(wi, size);
+  return ok ? PB_OK : fail_convergence(context, err);
 }
 
 // Reciprocal condition number of v (1-norm); 0 when singular or out of memory (*failed).
@@ -186,6 +194,7 @@ done:
 
 pb_status pb_block_diagonalize(size_t n, double *a, double *v, size_t *blocks, size_t *size,
                                const char *context, pb_error *err) {
+  if (!all_finite(a, n * n)) return fail_convergence(context, err);
   bool failed = false;
   double *copy = malloc(n * n * sizeof *copy);
   double *wr = malloc(n * sizeof *wr), *wi = malloc(n * sizeof *wi);

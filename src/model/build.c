@@ -152,9 +152,20 @@ done:
   return st;
 }
 
+// Magnitude of the slowest eigenvalue of a block: an overdamped pair has a slow and a fast one.
+static double slowest(const pb_model_part *p) {
+  double natural = pb_block_frequency(p->a, p->size);
+  if (p->size != 2) return natural;
+  double mean = 0.5 * (p->a[0] + p->a[1 + p->lda]), half = 0.5 * (p->a[0] - p->a[1 + p->lda]);
+  double discriminant = half * half + p->a[1] * p->a[p->lda];
+  if (discriminant <= 0) return natural;
+  return natural * (natural / (fabs(mean) + sqrt(discriminant)));
+}
+
 typedef struct rank {
   size_t block;
-  bool odd;  // not 2 × 2: last
+  bool odd;   // not 2 × 2: last
+  bool fast;  // every eigenvalue above the limit: replaced by its static contribution
   double frequency;
 } rank;
 
@@ -186,6 +197,31 @@ static pb_status copy_names(const pb_model *from, pb_model *to, pb_error *err) {
   return ok ? PB_OK : pb_fail_memory(err, "");
 }
 
+static bool all_finite(const double *x, size_t n) {
+  for (size_t i = 0; i < n; i++)
+    if (!isfinite(x[i])) return false;
+  return true;
+}
+
+// Numbers that are each fine may still overflow in products.
+static pb_status check_finite(const pb_model *m, pb_error *err) {
+  size_t values = m->block_value[m->blocks];
+  if (!all_finite(m->a, values) || !all_finite(m->ad, values))
+    return pb_fail(err, PB_ERR_NUMERIC, "/components",
+                   "masses, stiffnesses and dampings are too far apart: the state matrix overflows");
+  for (size_t i = 0; i < m->nu; i++)
+    if (!all_finite(m->b + i * m->nx, m->nx) || !all_finite(m->bd + i * m->nx, m->nx))
+      return pb_fail(err, PB_ERR_NUMERIC, "/inputs", "what %s does to the plant overflows",
+                     m->input[i].name);
+  for (size_t at = 0; at < m->ny * (m->nx + m->nu); at++) {
+    double value = at < m->ny * m->nx ? m->c[at] : m->d[at - m->ny * m->nx];
+    if (!isfinite(value))
+      return pb_fail(err, PB_ERR_NUMERIC, "/outputs", "what %s sees of the plant overflows",
+                     m->output[at % m->ny].name);
+  }
+  return PB_OK;
+}
+
 // The blocks of m in order, those above hz (0: none) gone into d.
 static pb_status rebuild(const pb_model *m, double hz, pb_model **out, pb_error *err) {
   double limit = hz > 0 ? two_pi * hz : INFINITY;
@@ -194,8 +230,8 @@ static pb_status rebuild(const pb_model *m, double hz, pb_model **out, pb_error 
   if (!order) return pb_fail_memory(err, "");
   for (size_t k = 0; k < m->blocks; k++) {
     pb_model_part p = part_of(m, k);
-    order[k] = (rank){k, p.size != 2, pb_block_frequency(p.a, p.size)};
-    if (order[k].frequency > limit) continue;
+    order[k] = (rank){k, p.size != 2, slowest(&p) > limit, pb_block_frequency(p.a, p.size)};
+    if (order[k].fast) continue;
     kept++, nx += p.size, values += p.size * p.size;
   }
   qsort(order, m->blocks, sizeof *order, rank_order);
@@ -208,12 +244,13 @@ static pb_status rebuild(const pb_model *m, double hz, pb_model **out, pb_error 
   }
   for (size_t k = 0; k < m->blocks && !st; k++) {
     pb_model_part p = part_of(m, order[k].block);
-    if (order[k].frequency > limit)
+    if (order[k].fast)
       st = add_static(copy, &p, err);
     else
       append(copy, &p);
   }
   if (!st) st = pb_model_discretize(copy, err);
+  if (!st) st = check_finite(copy, err);
   free(order);
   if (st) {
     pb_model_free(copy);

@@ -177,6 +177,9 @@ static pb_status clean(const pb_system *s, double *omega2, const double *shape, 
   double largest = omega2[s->n - 1];
   for (size_t j = 0; j < s->n; j++) {
     double hz = sqrt(fabs(omega2[j])) / two_pi;
+    if (!isfinite(hz))
+      return pb_fail(err, PB_ERR_NUMERIC, "/components",
+                     "a natural frequency overflows: a mass is too small for its stiffness");
     bool small = omega2[j] < 1e-9 * largest || s->n == 1;
     if (small && fabs(omega2[j]) <= noise_of(s, shape + j * s->n)) {
       omega2[j] = 0;

@@ -126,8 +126,9 @@ static pb_status warn_health(const pb_element *e, pb_warnings *warnings, pb_erro
 static pb_status check_finite(const double *x, size_t n, const char *name, const char *file,
                               pb_error *err) {
   for (size_t i = 0; i < n; i++)
-    if (!isfinite(x[i]))
-      return pb_fail(err, PB_ERR_ELEMENT, file, "%s has an entry that is not finite", name);
+    if (!(fabs(x[i]) <= 1e30))  // as in plant files: products stay finite
+      return pb_fail(err, PB_ERR_ELEMENT, file, "%s has an entry that is not finite or above 1e30",
+                     name);
   return PB_OK;
 }
 

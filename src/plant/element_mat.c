@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "plant/element.h"
 
@@ -113,6 +114,9 @@ static uint32_t word(const unsigned char *p, bool little) {
 // each with its length in front: they must end where the file ends. Other versions are left to matio.
 static pb_status check_complete(const char *path, pb_error *err) {
   unsigned char header[128], tag[8];
+  struct stat kind;  // a pipe would block whoever opens it, a device never end
+  if (!stat(path, &kind) && !S_ISREG(kind.st_mode))
+    return pb_fail(err, PB_ERR_IO, path, "is not a regular file");
   FILE *file = fopen(path, "rb");
   if (!file) return pb_fail(err, PB_ERR_IO, path, "cannot be opened: %m");
   pb_status st = PB_OK;

@@ -70,6 +70,12 @@ pb_status pb_reader_known(const pb_reader *r, const char *const *known, const pb
   return check_object(r->model, r->model_pointer, known, fields, count, r->err);
 }
 
+// No quantity in SI units comes near this, and products of a few numbers below it stay finite.
+static pb_status check_size(double x, const char *where, pb_error *err) {
+  if (fabs(x) <= 1e30) return PB_OK;
+  return pb_fail(err, PB_ERR_SCHEMA, where, "expected a number up to 1e30 in size, not %g", x);
+}
+
 static pb_status check_range(pb_range range, double x, const char *where, pb_error *err) {
   switch (range) {
   case PB_ANY:
@@ -98,7 +104,8 @@ pb_status pb_reader_number(const pb_reader *r, const pb_field *field, double *ou
   }
   if (!cJSON_IsNumber(value)) return pb_fail(r->err, PB_ERR_SCHEMA, where, "expected a number");
   *out = value->valuedouble;
-  return check_range(field->range, *out, where, r->err);
+  pb_status st = check_size(*out, where, r->err);
+  return st ? st : check_range(field->range, *out, where, r->err);
 }
 
 pb_status pb_reader_fields(const pb_reader *r, const pb_field *fields, size_t count, void *base,
@@ -124,6 +131,8 @@ pb_status pb_json_numbers(const cJSON *value, const char *where, size_t n, doubl
     pb_json_pointer(item, sizeof item, where, number);
     if (!cJSON_IsNumber(m)) return pb_fail(err, PB_ERR_SCHEMA, item, "expected a number");
     out[i] = m->valuedouble;
+    pb_status st = check_size(out[i], item, err);
+    if (st) return st;
   }
   return PB_OK;
 }

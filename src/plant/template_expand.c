@@ -187,26 +187,27 @@ static void add_point_of_interest(builder *b) {
   }
 }
 
-static bool has_name(const cJSON *list, const char *name) {
-  const cJSON *signal;
-  cJSON_ArrayForEach(signal, list) {
+// Index of the signal of this name in a list, or −1.
+static int find_signal(const cJSON *list, const char *name) {
+  int index = 0;
+  for (const cJSON *signal = list ? list->child : NULL; signal; signal = signal->next, index++) {
     const cJSON *n = pb_json_member(signal, "name");
-    if (cJSON_IsString(n) && !strcmp(n->valuestring, name)) return true;
+    if (cJSON_IsString(n) && !strcmp(n->valuestring, name)) return index;
   }
-  return false;
+  return -1;
 }
 
-// The template's signals that the file does not define itself, then the file's own.
+// The template's signals, those that the file defines itself in their place, then the file's others.
 static bool merge_signals(cJSON *out, const char *key, const cJSON *generated) {
   cJSON *own = cJSON_DetachItemFromObjectCaseSensitive(out, key);
   cJSON *list = cJSON_CreateArray();
   bool ok = list && (!own || cJSON_IsArray(own));
   const cJSON *signal;
   cJSON_ArrayForEach(signal, generated) {
-    if (has_name(own, pb_json_member(signal, "name")->valuestring)) continue;
-    cJSON *copy = cJSON_Duplicate(signal, 1);
-    bool added = ok && copy && cJSON_AddItemToArray(list, copy);
-    if (!added) cJSON_Delete(copy);
+    int index = find_signal(own, pb_json_member(signal, "name")->valuestring);
+    cJSON *item = index >= 0 ? cJSON_DetachItemFromArray(own, index) : cJSON_Duplicate(signal, 1);
+    bool added = ok && item && cJSON_AddItemToArray(list, item);
+    if (!added) cJSON_Delete(item);
     ok = ok && added;
   }
   while (ok && own && own->child)

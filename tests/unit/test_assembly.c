@@ -214,6 +214,32 @@ static void test_massless_is_condensed(void **state) {
   dispose(p, s);
 }
 
+// More outputs than degrees of freedom before the condensation.
+static void test_massless_with_many_outputs(void **state) {
+  (void)state;
+  enum { outputs = 12 };
+  char body[4096];
+  int n = snprintf(body, sizeof body,
+                   "\"components\": {" BODY("a", "") ", \"link\": {\"type\": \"rigid_body\", "
+                   "\"mass\": 0, \"inertia\": [0, 0, 0]}}, \"connections\": {" JOINT(
+                       "lower", "ground", "link", "{\"type\": \"prismatic\", \"k_a\": 300}") ", "
+                   JOINT("upper", "link", "a", "{\"type\": \"prismatic\", \"k_a\": 600}") "}, "
+                   "\"inputs\": [{\"name\": \"F\", \"type\": \"force\", \"frame\": \"a\", "
+                   "\"direction\": [0, 0, 1]}], \"outputs\": [");
+  for (int i = 0; i < outputs; i++)
+    n += snprintf(body + n, sizeof body - (size_t)n,
+                  "%s{\"name\": \"y%d\", \"type\": \"displacement\", \"frame\": \"%s\", "
+                  "\"direction\": [0, 0, 1]}", i ? ", " : "", i, i % 2 ? "link" : "a");
+  snprintf(body + n, sizeof body - (size_t)n, "]");
+  pb_plant *p;
+  pb_system *s;
+  REQUIRE(assemble(body, &p, &s, NULL, &err));
+  assert_int_equal(s->n, 1);
+  for (size_t i = 0; i < outputs; i++)
+    ASSERT_RELATIVE(compliance(s, i, 0), i % 2 ? 1 / 300.0 : 1 / 200.0, 1e-12);
+  dispose(p, s);
+}
+
 // An element as a joint between frames a beam's length apart; the other way round does not fit.
 static void test_element_joint(void **state) {
   (void)state;
@@ -256,7 +282,8 @@ int main(void) {
       cmocka_unit_test(test_cantilever),       cmocka_unit_test(test_offset_frame),
       cmocka_unit_test(test_joint_freedoms),   cmocka_unit_test(test_joint_axes),
       cmocka_unit_test(test_redundant_constraints), cmocka_unit_test(test_refusals),
-      cmocka_unit_test(test_massless_is_condensed), cmocka_unit_test(test_element_joint),
+      cmocka_unit_test(test_massless_is_condensed),
+      cmocka_unit_test(test_massless_with_many_outputs), cmocka_unit_test(test_element_joint),
       cmocka_unit_test(test_actuator_numbers),
   };
   return cmocka_run_group_tests(tests, setup, teardown);

@@ -2,6 +2,8 @@
 #include "support/beam.h"
 #include "support/check.h"
 
+#include <sys/stat.h>
+
 #include "plant/element.h"
 
 static const beam steel = {.length = 0.1, .ea = 2e7, .ei = 50, .gj = 40, .mass = 0.08, .polar_inertia = 2e-6};
@@ -109,6 +111,11 @@ static void test_broken_files(void **state) {
   pb_element *e = NULL;
   pb_error err = {0};
   assert_int_equal(pb_element_load("/nonexistent.mat", NULL, &e, &err), PB_ERR_IO);
+  unlink(path);
+  assert_int_equal(mkfifo(path, 0600), 0);  // refused without waiting for a writer
+  assert_int_equal(pb_element_load(path, NULL, &e, &err), PB_ERR_IO);
+  assert_non_null(strstr(err.message, "regular"));
+  unlink(path);
   beam_matrices(&steel, k, m, position);
   assert_int_equal(beam_write(path, 2, 12, k, m, position), 0);
   FILE *file = fopen(path, "r+b");

@@ -48,10 +48,10 @@ static pb_experiment_options standard(pb_excitation excitation) {
                                  .overlap = 0.5};
 }
 
-static pb_session *attach(const pb_model *m, fake_session_options options) {
+static pb_session *attach(const pb_model *m, fake_session_options options, size_t inputs) {
   pb_session *session = fake_session_new(m, options);
   const char *names[2] = {"u1", "u2"};
-  pb_attach_options a = {.channel = "identify", .inputs = names, .input_count = 2};
+  pb_attach_options a = {.channel = "identify", .inputs = names, .input_count = (uint32_t)inputs};
   assert_int_equal(pb_session_attach(session, &a, NULL), PB_OK);
   return session;
 }
@@ -90,6 +90,8 @@ static double error_of(pb_experiment *e, const pb_model *m) {
   if (pb_experiment_estimate(e, &frf, &err) != PB_OK) fail_msg("%s", err.message);
   double complex *h = malloc(frf.nf * 6 * sizeof *h);
   assert_int_equal(pb_model_frf(m, PB_SAMPLED, frf.frequency_hz, frf.nf, h, NULL), PB_OK);
+  // Of a model's two inputs the experiment may have the first only.
+  for (size_t k = 0; k < frf.nf * frf.ny * frf.nu; k++) h[k] = h[k / frf.nu * 2 + k % frf.nu];
   double worst = largest_error(&frf, h);
   free(h);
   pb_frf_clear(&frf);
@@ -98,7 +100,7 @@ static double error_of(pb_experiment *e, const pb_model *m) {
 
 static void check_open_loop(pb_experiment_options options, double tolerance) {
   pb_model *m = plant();
-  pb_session *session = attach(m, (fake_session_options){0});
+  pb_session *session = attach(m, (fake_session_options){0}, 2);
   pb_experiment *e = make(m, NULL, &options, false);
   uint64_t steps = pb_experiment_round_steps(e);
   pb_run_report report;
@@ -124,6 +126,31 @@ static void test_multisine(void **state) {
   check_open_loop(options, 1e-5);
 }
 
+// Hardly any waiting: the decay is taken out, for one input and for several.
+static void test_remove_transient(void **state) {
+  (void)state;
+  pb_experiment_options options = standard(PB_EXCITE_MULTISINE);
+  options.settle = 0;
+  pb_model *m = plant();
+  for (size_t inputs = 1; inputs <= 2; inputs++) {
+    double error[2];
+    for (int remove = 0; remove < 2; remove++) {
+      pb_experiment_channels some = {both, all, inputs, 3};
+      pb_experiment *e;
+      options.remove_transient = remove;
+      assert_int_equal(pb_experiment_new(m, &some, NULL, &options, false, &e, NULL), PB_OK);
+      pb_session *session = attach(m, (fake_session_options){0}, inputs);
+      assert_int_equal(pb_experiment_run(e, session, NULL, NULL, NULL), PB_OK);
+      error[remove] = error_of(e, m);
+      if (remove) assert_true(pb_experiment_trouble_of(e)->decay > 0.999);
+      pb_experiment_free(e);
+      fake_session_free(session);
+    }
+    if (!(error[0] > 1e-4 && error[1] < 1e-7)) fail_msg("errors %g and %g", error[0], error[1]);
+  }
+  pb_model_free(m);
+}
+
 static void test_chirp_and_periodic_noise(void **state) {
   (void)state;
   // A sweep's last turn leaves the lines at the band's ends weak: the band is kept inside.
@@ -145,7 +172,7 @@ static void test_noise(void **state) {
 static void test_late_bus(void **state) {
   (void)state;
   pb_model *m = plant();
-  pb_session *session = attach(m, (fake_session_options){.delay = 1, .miss_every = 9000});
+  pb_session *session = attach(m, (fake_session_options){.delay = 1, .miss_every = 9000}, 2);
   pb_experiment_options options = standard(PB_EXCITE_MULTISINE);
   options.averages = 8;
   pb_experiment *e = make(m, NULL, &options, true);
@@ -168,7 +195,7 @@ static void check_closed_loop(unsigned delay) {
   pb_experiment_options options = standard(PB_EXCITE_MULTISINE);
   options.settle = 6;  // the controller's own poles are slow
   pb_experiment *e = make(m, &feedback, &options, delay > 0);
-  pb_session *session = attach(m, (fake_session_options){.delay = delay});
+  pb_session *session = attach(m, (fake_session_options){.delay = delay}, 2);
   assert_int_equal(pb_experiment_run(e, session, NULL, NULL, NULL), PB_OK);
   pb_frf frf;
   assert_int_equal(pb_experiment_estimate(e, &frf, NULL), PB_OK);
@@ -201,7 +228,7 @@ static void test_divergence(void **state) {
   pb_experiment_options options = standard(PB_EXCITE_MULTISINE);
   options.limit = 50;
   pb_experiment *e = make(m, &feedback, &options, false);
-  pb_session *session = attach(m, (fake_session_options){0});
+  pb_session *session = attach(m, (fake_session_options){0}, 2);
   pb_error err;
   assert_int_equal(pb_experiment_run(e, session, NULL, NULL, &err), PB_ERR_STATE);
   const pb_experiment_trouble *t = pb_experiment_trouble_of(e);
@@ -225,7 +252,7 @@ static size_t saved_bytes(uint64_t seed, char **bytes) {
   options.seed = seed;
   options.averages = 4;
   pb_experiment *e = make(m, NULL, &options, false);
-  pb_session *session = attach(m, (fake_session_options){0});
+  pb_session *session = attach(m, (fake_session_options){0}, 2);
   size_t size = 0;
   FILE *stream = open_memstream(bytes, &size);
   pb_experiment_save_to(e, stream);
@@ -273,10 +300,15 @@ static void test_refusals(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_multisine),   cmocka_unit_test(test_chirp_and_periodic_noise),
-      cmocka_unit_test(test_noise),       cmocka_unit_test(test_late_bus),
-      cmocka_unit_test(test_closed_loop), cmocka_unit_test(test_divergence),
-      cmocka_unit_test(test_same_bytes),  cmocka_unit_test(test_refusals),
+      cmocka_unit_test(test_multisine),
+      cmocka_unit_test(test_remove_transient),
+      cmocka_unit_test(test_chirp_and_periodic_noise),
+      cmocka_unit_test(test_noise),
+      cmocka_unit_test(test_late_bus),
+      cmocka_unit_test(test_closed_loop),
+      cmocka_unit_test(test_divergence),
+      cmocka_unit_test(test_same_bytes),
+      cmocka_unit_test(test_refusals),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

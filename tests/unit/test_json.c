@@ -22,10 +22,34 @@ static void test_refused(void **state) {
   refuse("{\"a\": [1, 1e999]}", "/a/1", "too large");
   refuse("", "", "not well-formed");
   refuse("{\"a\": nan}", "", "line 1");
+  refuse("{\"a\": \"b\\u0000c\"}", "", "column 9: a NUL");
+  refuse("{\"a\nb\": 1}", "", "control character");
+  refuse("[\"\xc3(\"]", "", "not UTF-8");
+  refuse("[\"\xed\xa0\x80\"]", "", "not UTF-8");  // half a surrogate pair
+  static const char *const numbers[] = {"01", "-01", "3.", "-", "1e", "1e+", "-.5", "3.e1"};
+  for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+    char text[16];
+    snprintf(text, sizeof text, "[%s]", numbers[i]);
+    refuse(text, "", "column 2: a number");
+  }
   cJSON *value = NULL;
   pb_error err = {0};
   assert_int_equal(pb_json_parse("{}\0{}", 5, &value, &err), PB_ERR_SYNTAX);
   assert_non_null(strstr(err.message, "NUL"));
+}
+
+// What looks like an offence and is none.
+static void test_accepted(void **state) {
+  (void)state;
+  static const char *const texts[] = {
+      "[\"\\\\u0000\", \"01\", \"\\\"3.\", 0, -0, 0.5, -0.5e-01, 10, 1E+3]",
+      "{\"\xc3\xa9\xe2\x9c\x93\xf0\x9f\x94\xa7\": \"\\u00e9\\n\"}",
+  };
+  for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+    cJSON *value = NULL;
+    REQUIRE(pb_json_parse(texts[i], strlen(texts[i]), &value, &err));
+    cJSON_Delete(value);
+  }
 }
 
 static void test_case_matters(void **state) {
@@ -107,7 +131,8 @@ static void test_read_names_the_file(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_refused),         cmocka_unit_test(test_case_matters),
+      cmocka_unit_test(test_refused),         cmocka_unit_test(test_accepted),
+      cmocka_unit_test(test_case_matters),
       cmocka_unit_test(test_numbers_survive), cmocka_unit_test(test_print),
       cmocka_unit_test(test_merge),           cmocka_unit_test(test_read_names_the_file),
   };

@@ -14,19 +14,32 @@ static pb_model *load(const char *name) {
   return m;
 }
 
-static pb_model *compile(const char *body) {
+static pb_status try_compile(const char *body, pb_model **model, pb_error *error) {
   char text[4096];
   pb_plant *p = NULL;
   pb_system *s = NULL;
-  pb_model *m = NULL;
   int n = snprintf(text, sizeof text, "{\"schema\": \"plantbus.plant/1\", \"name\": \"t\", %s}", body);
   REQUIRE(pb_plant_parse(text, (size_t)n, NULL, NULL, &p, &err));
   REQUIRE(pb_system_assemble(p, NULL, &s, &err));
-  REQUIRE(pb_model_compile(s, NULL, &m, &err));
+  pb_status st = pb_model_compile(s, NULL, model, error);
   pb_system_free(s);
   pb_plant_free(p);
+  return st;
+}
+
+static pb_model *compile(const char *body) {
+  pb_model *m = NULL;
+  REQUIRE(try_compile(body, &m, &err));
   return m;
 }
+
+// A mass on a vertical guide with a spring and a damper.
+#define GUIDED(mass, k, c)                                                                         \
+  "\"components\": {\"a\": {\"type\": \"rigid_body\", \"mass\": " mass ", \"inertia\": [1, 1, "  \
+  "1]}}, \"connections\": {\"j\": {\"from\": \"ground\", \"to\": \"a\", \"joint\": {\"type\": "  \
+  "\"prismatic\", \"k_a\": " k ", \"c_a\": " c "}}}, \"inputs\": [{\"name\": \"F\", \"type\": "     \
+  "\"force\", \"frame\": \"a\", \"direction\": [0, 0, 1]}], \"outputs\": [{\"name\": \"y\", "      \
+  "\"type\": \"displacement\", \"frame\": \"a\", \"direction\": [0, 0, 1]}]"
 
 // Largest |A V − V blocks| over the largest |A|.
 static double residual(size_t n, const double *a, const double *blocks, const double *v) {
@@ -95,6 +108,19 @@ static void test_blocks_of_a_defective_matrix(void **state) {
   assert_int_equal(total, 5);
   assert_true(blocks >= 2 && largest >= 2 && largest <= 4);
   assert_true(residual(5, full, d, v) < 1e-12);
+}
+
+// Entries that are not finite are refused before and after the eigenvalues.
+static void test_blocks_of_overflow(void **state) {
+  (void)state;
+  static const double bad[] = {NAN, INFINITY, -INFINITY};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    double a[9] = {0, -4, 0, 1, bad[i], 0, 0, 0, -3}, v[9];
+    size_t blocks, size[3];
+    pb_error err = {0};
+    assert_int_equal(pb_block_diagonalize(3, a, v, &blocks, size, "t", &err), PB_ERR_NUMERIC);
+    assert_string_equal(err.where, "t");
+  }
 }
 
 // e^{A h} and its integral against the closed forms, also for a defective block and fast modes.
@@ -197,6 +223,34 @@ static void test_truncation_keeps_static_gains(void **state) {
   pb_model_free(m);
 }
 
+// An overdamped mode above max_frequency stays where one of its two poles is below: here 1.6 Hz.
+static void test_truncation_keeps_slow_poles(void **state) {
+  (void)state;
+  pb_model *m = compile("\"max_frequency\": 100, " GUIDED("1", "1e6", "1e5")), *t = NULL;
+  assert_int_equal(m->nx, 2);
+  double complex h;
+  double hz = 3;
+  REQUIRE(pb_model_frf(m, PB_CONTINUOUS, &hz, 1, &h, &err));
+  double complex s = 2 * M_PI * hz * I, exact = 1 / (s * s + 1e5 * s + 1e6);
+  assert_true(cabs(h - exact) < 1e-12 * cabs(exact));
+  REQUIRE(pb_model_truncate(m, 1, &t, &err));  // both are above
+  assert_int_equal(t->nx, 0);
+  pb_model_free(t);
+  pb_model_free(m);
+}
+
+// Numbers that are each allowed but overflow together are refused, not computed with.
+static void test_overflow_is_refused(void **state) {
+  (void)state;
+  pb_model *m = NULL;
+  pb_error err = {0};
+  assert_int_equal(try_compile(GUIDED("1e-300", "1e30", "0"), &m, &err), PB_ERR_NUMERIC);
+  assert_string_equal(err.where, "/components");
+  assert_null(m);
+  assert_int_equal(try_compile(GUIDED("1e-300", "1", "1e30"), &m, &err), PB_ERR_NUMERIC);
+  assert_null(m);
+}
+
 // The sampled response is what stepping gives: response to an impulse, transformed.
 static void test_sampled_response_is_what_steps_do(void **state) {
   (void)state;
@@ -267,10 +321,13 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_blocks_of_distinct_eigenvalues),
       cmocka_unit_test(test_blocks_of_a_defective_matrix),
+      cmocka_unit_test(test_blocks_of_overflow),
       cmocka_unit_test(test_discretisation),
       cmocka_unit_test(test_floating_body),
       cmocka_unit_test(test_critical_damping),
       cmocka_unit_test(test_truncation_keeps_static_gains),
+      cmocka_unit_test(test_truncation_keeps_slow_poles),
+      cmocka_unit_test(test_overflow_is_refused),
       cmocka_unit_test(test_sampled_response_is_what_steps_do),
       cmocka_unit_test(test_derivative),
       cmocka_unit_test(test_pack),

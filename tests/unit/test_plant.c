@@ -107,6 +107,9 @@ static void test_component_mistakes(void **state) {
       {"{\"components\": {\"apa\": {\"model\": \"nothing\"}}}", PB_ERR_REFERENCE,
        "/components/apa/model", "nothing"},
       {"{\"components\": {\"apa\": {\"k_1\": -3}}}", PB_ERR_SCHEMA, "/components/apa/k_1", "≥ 0"},
+      {"{\"components\": {\"apa\": {\"c_1\": 1e31}}}", PB_ERR_SCHEMA, "/components/apa/c_1", "1e30"},
+      {"{\"components\": {\"mass\": {\"position\": [0, 0, -1e200]}}}", PB_ERR_SCHEMA,
+       "/components/mass/position/2", "1e30"},
       {"{\"models\": {\"apa300ml\": {\"k_a\": null}}}", PB_ERR_SCHEMA, "/components/apa/k_a",
        "missing"},
       {"{\"components\": {\"a.b\": {\"type\": \"rigid_body\"}}}", PB_ERR_SCHEMA,
@@ -226,6 +229,17 @@ static void test_template_expands(void **state) {
   for (size_t i = 0; i < p->connection_count; i++)
     if (!strcmp(p->connection[i].name, "top_joint2"))
       assert_int_equal(p->connection[i].joint.type, PB_WELD);
+  pb_plant_free(p);
+  // A signal of the template's name takes its place, others follow.
+  REQUIRE(parse_patched(hexapod,
+                        "{\"inputs\": [{\"name\": \"extra\", \"type\": \"force\", \"frame\": "
+                        "\"payload\", \"direction\": [0, 0, 1]}, {\"name\": \"Va2\", \"type\": "
+                        "\"actuator_force\", \"component\": \"strut2\"}]}",
+                        &p, &err));
+  assert_int_equal(p->input_count, 13);
+  assert_string_equal(p->input[1].name, "Va2");
+  assert_int_equal(p->input[1].type, PB_ACTUATOR_FORCE);
+  assert_string_equal(p->input[12].name, "extra");
   pb_plant_free(p);
   REQUIRE(parse_patched(hexapod, "{\"template\": {\"payload\": null}}", &p, &err));
   assert_int_equal(p->component_count, 7);
