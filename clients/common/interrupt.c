@@ -3,7 +3,7 @@
 
 #include <signal.h>
 
-static volatile sig_atomic_t interrupted; // written by the handler only
+static volatile sig_atomic_t interrupted;  // written by the handler only
 
 static void on_signal(int number) {
   (void)number;

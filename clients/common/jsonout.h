@@ -16,8 +16,8 @@ enum { PB_JSONOUT_DEPTH = 32 };
 typedef struct pb_jsonout {
   FILE *stream;
   int depth;
-  bool empty[PB_JSONOUT_DEPTH]; // nothing written yet at this level
-  bool flat[PB_JSONOUT_DEPTH];  // this level and those below stay on one line
+  bool empty[PB_JSONOUT_DEPTH];  // nothing written yet at this level
+  bool flat[PB_JSONOUT_DEPTH];   // this level and those below stay on one line
 } pb_jsonout;
 
 void pb_jsonout_begin(pb_jsonout *json, FILE *stream);
@@ -28,13 +28,13 @@ void pb_jsonout_end(pb_jsonout *json);
 void pb_jsonout_object(pb_jsonout *json, const char *key);
 void pb_jsonout_object_end(pb_jsonout *json);
 void pb_jsonout_array(pb_jsonout *json, const char *key);
-void pb_jsonout_row(pb_jsonout *json, const char *key); // an array kept on one line
-void pb_jsonout_array_end(pb_jsonout *json);            // of either kind
+void pb_jsonout_row(pb_jsonout *json, const char *key);  // an array kept on one line
+void pb_jsonout_array_end(pb_jsonout *json);             // of either kind
 
 void pb_jsonout_number(pb_jsonout *json, const char *key, double value);
 void pb_jsonout_integer(pb_jsonout *json, const char *key, uint64_t value);
 void pb_jsonout_boolean(pb_jsonout *json, const char *key, bool value);
-void pb_jsonout_text(pb_jsonout *json, const char *key, const char *text); // NULL: null
+void pb_jsonout_text(pb_jsonout *json, const char *key, const char *text);  // NULL: null
 void pb_jsonout_numbers(pb_jsonout *json, const char *key, const double *value, size_t count);
 void pb_jsonout_texts(pb_jsonout *json, const char *key, const char *const *text, size_t count);
 

@@ -31,8 +31,8 @@ pb_status pb_matfile_open(const char *path, pb_matfile **out, pb_error *err) {
   pb_status status = pb_outfile_create(path, &made->file, err);
   if (!status) {
     // A header of our own has no date in it: the same data give the same bytes.
-    made->mat = Mat_CreateVer(made->file.temp, "MATLAB 5.0 MAT-file, created by plantbus " PB_VERSION,
-                              MAT_FT_MAT5);
+    made->mat = Mat_CreateVer(made->file.temp,
+                              "MATLAB 5.0 MAT-file, created by plantbus " PB_VERSION, MAT_FT_MAT5);
     if (!made->mat) status = pb_fail(err, PB_ERR_IO, path, "cannot be written");
   }
   if (status) {
@@ -88,8 +88,8 @@ void pb_matfile_real(pb_matfile *mat, const char *name, size_t rows, size_t cols
   size_t dims[2] = {rows, cols}, bytes = 8 * rows * cols;
   if (!may_write(mat, name, bytes)) return;
   double none = 0;
-  matvar_t *v = Mat_VarCreate(name, MAT_C_DOUBLE, MAT_T_DOUBLE, 2, dims,
-                              data ? (void *)data : &none, 0);
+  matvar_t *v =
+      Mat_VarCreate(name, MAT_C_DOUBLE, MAT_T_DOUBLE, 2, dims, data ? (void *)data : &none, 0);
   put(mat, v, name, MATRIX_HEAD + bytes);
 }
 
@@ -108,8 +108,7 @@ static void put_complex(pb_matfile *mat, const char *name, int rank, size_t *dim
     part[count + k] = cimag(value);
   }
   mat_complex_split_t split = {part, part + count};
-  matvar_t *v =
-      Mat_VarCreate(name, MAT_C_DOUBLE, MAT_T_DOUBLE, rank, dims, &split, MAT_F_COMPLEX);
+  matvar_t *v = Mat_VarCreate(name, MAT_C_DOUBLE, MAT_T_DOUBLE, rank, dims, &split, MAT_F_COMPLEX);
   put(mat, v, name, MATRIX_HEAD + 8 + 16 * count);
   free(part);
 }

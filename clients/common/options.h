@@ -17,8 +17,8 @@
 
 enum {
   PB_EXIT_DONE = 0,
-  PB_EXIT_FAILED = 1, // the tool understood what was asked and could not do it
-  PB_EXIT_USAGE = 2,  // the command line is wrong
+  PB_EXIT_FAILED = 1,  // the tool understood what was asked and could not do it
+  PB_EXIT_USAGE = 2,   // the command line is wrong
 };
 
 // argp_parse with the project's conventions: usage errors exit with PB_EXIT_USAGE, --version prints
@@ -36,7 +36,7 @@ bool pb_parse_double_list(const char *text, double **out, size_t *count);
 // A growing list of names that flags such as --input a,b --input c fill. Zero-initialise.
 typedef struct pb_name_list {
   size_t count;
-  char **name; // [count], each owned
+  char **name;  // [count], each owned
 } pb_name_list;
 
 // Appends the comma-separated names of text; false: an empty name, or out of memory.
@@ -57,7 +57,7 @@ void pb_option_names(const struct argp_state *state, const char *flag, const cha
 // and hand it a pb_common_options as its input (state->child_inputs[...]) on ARGP_KEY_INIT.
 typedef struct pb_common_options {
   uint32_t domain;
-  const char *plant; // NULL: the only plant of the domain
+  const char *plant;  // NULL: the only plant of the domain
 } pb_common_options;
 
 extern const struct argp pb_common_argp;

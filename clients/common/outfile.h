@@ -10,8 +10,8 @@
 #include "base/status.h"
 
 typedef struct pb_outfile {
-  char *path; // the target
-  char *temp; // what is written to; equal text to path when written directly
+  char *path;  // the target
+  char *temp;  // what is written to; equal text to path when written directly
   bool direct;
 } pb_outfile;
 

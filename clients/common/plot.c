@@ -21,7 +21,7 @@ static const char *const palette[PALETTE] = {"#0072b2", "#d55e00", "#009e73", "#
 // The vertical layout in points, from the top.
 typedef struct layout {
   int height, top, legend_rows, legend_columns;
-  double first; // top of the first panel
+  double first;  // top of the first panel
 } layout;
 
 // ---- texts and data -----------------------------------------------------------------------------
@@ -215,7 +215,7 @@ static void put_axis(FILE *script, char axis, const pb_plot_panel *panel, const 
   if (given || (axis == 'x' && high > low)) {
     fprintf(script, "set %crange [%.9g:%.9g]\n", axis, low, high);
   }
-  if (a->log && high > 2 * low) { // a shorter axis reads better with equal distances
+  if (a->log && high > 2 * low) {  // a shorter axis reads better with equal distances
     if (axis == 'y' && !given) widen_log(&low, &high);
     put_log_axis(script, axis, low, high, hide);
   } else if (a->tick > 0) {

@@ -60,9 +60,9 @@ static double choose_window(const pb_bode_plot *plot) {
 
 // The three panels' curves and the memory behind them.
 typedef struct bode_work {
-  pb_plot_curve *magnitude, *phase, *coherence; // [plot->count] each
+  pb_plot_curve *magnitude, *phase, *coherence;  // [plot->count] each
   size_t coherences;
-  double *data; // 5 numbers a point: magnitude, phase x and y twice
+  double *data;  // 5 numbers a point: magnitude, phase x and y twice
 } bode_work;
 
 static bool allocate(const pb_bode_plot *plot, bode_work *work) {

@@ -23,7 +23,7 @@ static int spawn_gnuplot(pid_t *pid, int script, int picture, int messages) {
   failure = posix_spawn_file_actions_adddup2(&actions, script, STDIN_FILENO);
   if (!failure) failure = posix_spawn_file_actions_adddup2(&actions, picture, STDOUT_FILENO);
   if (!failure) failure = posix_spawn_file_actions_adddup2(&actions, messages, STDERR_FILENO);
-  char *arguments[] = {"gnuplot", "-d", NULL}; // -d: without the user's start-up files
+  char *arguments[] = {"gnuplot", "-d", NULL};  // -d: without the user's start-up files
   if (!failure) failure = posix_spawnp(pid, "gnuplot", &actions, NULL, arguments, environ);
   posix_spawn_file_actions_destroy(&actions);
   return failure;

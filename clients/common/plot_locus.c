@@ -53,10 +53,10 @@ static pb_plot_curve split(const double complex *point, size_t count, double *x,
 }
 
 typedef struct locus_work {
-  pb_plot_curve *curve; // rays, branches, markers
+  pb_plot_curve *curve;  // rays, branches, markers
   size_t curves;
   double *data, *next;
-  double ray[RAYS][4]; // x then y of the two ends
+  double ray[RAYS][4];  // x then y of the two ends
   pb_plot_text text[RAYS];
   char label[RAYS][24];
   size_t rays;

@@ -7,8 +7,8 @@
 
 typedef struct pb_progress {
   FILE *stream;
-  bool on;            // stream is a terminal
-  double begun, last; // monotonic seconds: start, last redraw
+  bool on;             // stream is a terminal
+  double begun, last;  // monotonic seconds: start, last redraw
   char label[64];
 } pb_progress;
 

@@ -15,11 +15,11 @@ enum { PB_TABLE_COLUMNS = 32 };
 
 typedef struct pb_table {
   size_t columns;
-  int digits[PB_TABLE_COLUMNS]; // significant digits of a number column; 0: a text column
-  char *head[PB_TABLE_COLUMNS]; // "name" or "name [unit]"
+  int digits[PB_TABLE_COLUMNS];  // significant digits of a number column; 0: a text column
+  char *head[PB_TABLE_COLUMNS];  // "name" or "name [unit]"
   size_t cells, capacity;
-  char **cell; // [cells] row by row
-  bool failed; // an allocation failed, or there are too many columns
+  char **cell;  // [cells] row by row
+  bool failed;  // an allocation failed, or there are too many columns
 } pb_table;
 
 // Columns first: right-aligned numbers (digits > 0) or left-aligned text (pb_table_text_column).
@@ -29,7 +29,7 @@ void pb_table_text_column(pb_table *table, const char *name);
 
 // The next cell. A number that is not finite shows as "–"; text may be NULL (an empty cell).
 void pb_table_number(pb_table *table, double value);
-void pb_table_count(pb_table *table, size_t value); // all digits, also in a number column
+void pb_table_count(pb_table *table, size_t value);  // all digits, also in a number column
 void pb_table_text(pb_table *table, const char *text);
 
 // Prints header, rule and rows, each line indented by `indent` blanks. Widths count characters, not

@@ -1,5 +1,6 @@
 // plantbus-example: a controller of your own in one page. Integral force feedback on one actuator:
-//   u(k) = (1 − ε) u(k−1) + g T y(k)        an integrator that forgets slow offsets (ε = 2π·2 Hz · T)
+//   u(k) = (1 − ε) u(k−1) + g T y(k)        an integrator that forgets slow offsets (ε = 2π·2 Hz ·
+//   T)
 // Usage: plantbus-example INPUT OUTPUT GAIN SECONDS [DOMAIN]
 #include <stdio.h>
 #include <stdlib.h>

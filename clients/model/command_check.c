@@ -13,10 +13,10 @@ typedef struct check {
   pb_plant *plant;
   pb_model *model;
   pb_warnings warnings;
-  pb_error error; // code PB_OK: the plant is usable
+  pb_error error;  // code PB_OK: the plant is usable
   size_t elements;
-  const pb_element **element; // [elements] each once
-  double fastest_growth;      // largest real part of the poles, 1/s
+  const pb_element **element;  // [elements] each once
+  double fastest_growth;       // largest real part of the poles, 1/s
 } check;
 
 static const pb_element *joint_element(const pb_connection *c) {

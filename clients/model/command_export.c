@@ -11,7 +11,7 @@
 typedef struct export {
   const tool *t;
   const pb_model *model;
-  channels ch; // all of the model's
+  channels ch;  // all of the model's
 }
 export;
 

@@ -18,8 +18,8 @@ typedef struct frf {
   const pb_model *model;
   channels ch;
   size_t count;
-  double *hz;        // [count]
-  double complex *h; // [count][outputs][inputs]: the chosen ones
+  double *hz;         // [count]
+  double complex *h;  // [count][outputs][inputs]: the chosen ones
 } frf;
 
 static double complex value_of(const frf *f, size_t k, size_t o, size_t i) {
@@ -45,7 +45,7 @@ static bool make_grid(const tool *t, frf *f) {
     double part = f->count > 1 ? (double)k / (double)(f->count - 1) : 0;
     f->hz[k] = t->linear ? from + part * (to - from) : from * pow(to / from, part);
   }
-  if (f->count > 1) f->hz[f->count - 1] = to; // not one rounding error beyond
+  if (f->count > 1) f->hz[f->count - 1] = to;  // not one rounding error beyond
   return true;
 }
 
@@ -181,8 +181,8 @@ static const char *common_unit(const frf *f, char text[64]) {
 
 typedef struct bode_memory {
   pb_bode_curve *curve;
-  double complex *h;  // [pairs][count]
-  char (*label)[160]; // [pairs]
+  double complex *h;   // [pairs][count]
+  char (*label)[160];  // [pairs]
 } bode_memory;
 
 static void fill_curves(const frf *f, bool with_units, bode_memory *b) {

@@ -11,7 +11,7 @@ enum { FIRST_MODES = 6, GAIN_COLUMNS = 6 };
 typedef struct info {
   const pb_model *model;
   const channels *ch;
-  const double *gain; // [ny][nu]; NULL when it cannot be computed
+  const double *gain;  // [ny][nu]; NULL when it cannot be computed
 } info;
 
 static void info_json(pb_jsonout *json, const void *context) {

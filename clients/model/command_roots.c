@@ -25,7 +25,7 @@ int command_modes(const tool *t, const pb_model *model) {
 // Roots in columns of their own: |s|/2π, damping, real and imaginary part.
 typedef struct root_list {
   size_t count;
-  double *hz, *damping, *real, *imag; // one block of memory, at hz
+  double *hz, *damping, *real, *imag;  // one block of memory, at hz
 } root_list;
 
 // The continuous-time equivalent of a root; sampled roots z = e^{sT}.
@@ -69,7 +69,7 @@ static int compare_size(const void *a, const void *b) {
   double complex x = *(const double complex *)a, y = *(const double complex *)b;
   double difference = cabs(x) - cabs(y);
   if (fabs(difference) > 1e-12 * cabs(x)) return difference > 0 ? 1 : -1;
-  return (cimag(x) < cimag(y)) - (cimag(x) > cimag(y)); // of a pair, the upper one first
+  return (cimag(x) < cimag(y)) - (cimag(x) > cimag(y));  // of a pair, the upper one first
 }
 
 // The picture of poles and zeros shows continuous time, the upper half plane.

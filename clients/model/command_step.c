@@ -16,11 +16,11 @@ enum { DEFAULT_STEPS = 1000, TABLE_STEPS = 20, PANELS = 4 };
 typedef struct step {
   const tool *t;
   const pb_model *model;
-  channels ch;    // inputs: the one that steps
-  size_t count;   // rows
-  double *number; // [count] step numbers, ascending
-  double *time;   // [count] s
-  double *output; // [outputs][count], column by column
+  channels ch;     // inputs: the one that steps
+  size_t count;    // rows
+  double *number;  // [count] step numbers, ascending
+  double *time;    // [count] s
+  double *output;  // [outputs][count], column by column
 } step;
 
 // ---- computing ----------------------------------------------------------------------------------
@@ -151,8 +151,8 @@ typedef struct step_plot {
   char label[PANELS][64];
   const char *unit[PANELS];
   size_t panels;
-  pb_plot_curve *curve; // [PANELS][outputs]
-  double *scaled;       // [outputs][count]
+  pb_plot_curve *curve;  // [PANELS][outputs]
+  double *scaled;        // [outputs][count]
 } step_plot;
 
 // A prefix that brings lengths, angles and voltages to readable numbers.

@@ -32,7 +32,7 @@ enum {
 
 typedef struct command {
   const char *name;
-  command_function *run; // NULL: check, which loads by itself
+  command_function *run;  // NULL: check, which loads by itself
   unsigned options, formats;
 } command;
 
@@ -91,7 +91,7 @@ static const char description[] =
 typedef struct line {
   tool tool;
   const command *command;
-  unsigned given; // options that were used
+  unsigned given;  // options that were used
 } line;
 
 static const char *option_name(int key) {

@@ -12,7 +12,7 @@
 #include "options.h"
 
 typedef enum format {
-  FORMAT_NONE, // no -o
+  FORMAT_NONE,  // no -o
   FORMAT_JSON = 1,
   FORMAT_CSV = 2,
   FORMAT_MAT = 4,
@@ -21,19 +21,19 @@ typedef enum format {
 
 // The command line. Lists are owned by main.
 typedef struct tool {
-  const char *file;  // the plant file
-  bool json;         // JSON on standard output in place of tables
-  const char *out;   // result file, or NULL
-  format out_format; // by its extension
+  const char *file;   // the plant file
+  bool json;          // JSON on standard output in place of tables
+  const char *out;    // result file, or NULL
+  format out_format;  // by its extension
   pb_name_list inputs, outputs;
-  double *frequencies; // Hz [frequency_count]; NULL: from, to, points
+  double *frequencies;  // Hz [frequency_count]; NULL: from, to, points
   size_t frequency_count;
-  double from, to;      // Hz; 0: default
-  uint64_t points;      // 0: default
-  double max_frequency; // Hz; 0: none given
+  double from, to;       // Hz; 0: default
+  uint64_t points;       // 0: default
+  double max_frequency;  // Hz; 0: none given
   bool linear, sampled, decibel;
-  uint64_t steps; // 0: default
-  double *at;     // [at_count] step numbers; NULL: 1 … steps
+  uint64_t steps;  // 0: default
+  double *at;      // [at_count] step numbers; NULL: 1 … steps
   size_t at_count;
   double amplitude;
 } tool;
@@ -59,8 +59,8 @@ int tool_end(pb_status status, const pb_error *err);
 
 typedef struct channels {
   size_t inputs, outputs;
-  size_t *input, *output;                 // indices in the model's lists
-  const char **input_name, **output_name; // [inputs], [outputs]; the model's
+  size_t *input, *output;                  // indices in the model's lists
+  const char **input_name, **output_name;  // [inputs], [outputs]; the model's
   const char **input_unit, **output_unit;
 } channels;
 
@@ -84,7 +84,7 @@ typedef struct column {
 typedef struct columns {
   size_t count, rows;
   const column *column;
-  const channels *channels; // named in JSON and MAT files; or NULL
+  const channels *channels;  // named in JSON and MAT files; or NULL
 } columns;
 
 // Writes columns wherever the command line asks: table or JSON on standard output, a file by -o

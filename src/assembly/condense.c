@@ -1,7 +1,8 @@
 // Static condensation of massless motions: see eliminate.h.
 //
-// The mass matrix is scaled by D = diag(M)^-½ so that kilograms and kilogram square metres compare; the
-// eigenvectors of D M D whose eigenvalue is zero to rounding are the massless motions Z, the others A.
+// The mass matrix is scaled by D = diag(M)^-½ so that kilograms and kilogram square metres compare;
+// the eigenvectors of D M D whose eigenvalue is zero to rounding are the massless motions Z, the
+// others A.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,8 +20,8 @@ static void multiply(const char *transa, size_t m, size_t n, size_t k, const dou
   if (m && n) dgemm_(transa, "N", &im, &in, &ik, &one, a, &la, b, &lb, &zero, c, &im);
 }
 
-// Basis [A Z] of all motions: columns of `basis`; *count of them massless, last. Eigenvalues ascend, so
-// the eigenvectors are stored in reverse.
+// Basis [A Z] of all motions: columns of `basis`; *count of them massless, last. Eigenvalues
+// ascend, so the eigenvectors are stored in reverse.
 static pb_status split(const pb_system *s, double *basis, size_t *count, pb_error *err) {
   int n = (int)s->n, info = 0, lwork = 1 + 6 * n + 2 * n * n, liwork = 3 + 5 * n;
   size_t size = s->n;
@@ -195,10 +196,11 @@ static pb_status condense(pb_system *s, condensation *c, const pb_null_basis *ba
     return fail_singular(s, basis, layout, z, c->nz, c->kzz, err);
   }
   if (damps(c, s)) {
-    pb_status st = pb_warn(warnings, err, "/components",
-                           "%zu massless motions are condensed statically: what damping acts on them "
-                           "follows the static shape",
-                           c->nz);
+    pb_status st =
+        pb_warn(warnings, err, "/components",
+                "%zu massless motions are condensed statically: what damping acts on them "
+                "follows the static shape",
+                c->nz);
     if (st) return st;
   }
   add_static(c, s);
@@ -218,7 +220,8 @@ static pb_status condense(pb_system *s, condensation *c, const pb_null_basis *ba
   return PB_OK;
 }
 
-// A Cholesky factorisation with healthy pivots shows that nothing is massless, without the eigenvectors.
+// A Cholesky factorisation with healthy pivots shows that nothing is massless, without the
+// eigenvectors.
 static bool has_massless(const pb_system *s, bool *failed) {
   int n = (int)s->n, info = 0;
   size_t size = s->n;

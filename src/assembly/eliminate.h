@@ -9,14 +9,14 @@
 // An orthonormal basis N of null(G) in factored form: Gᵀ P = Q R with pivoting, N = Q[:, rank:].
 typedef struct pb_null_basis {
   size_t n, rank;
-  double *q;    // n × constraints: the reflectors of dgeqp3
+  double *q;  // n × constraints: the reflectors of dgeqp3
   double *tau;
 } pb_null_basis;
 
 // Rank-revealing factorisation of the constraints. Redundant ones are dropped; one that is nearly
 // redundant (1e-9 < |R_jj| < 1e-6) is warned about by the name of its connection. [init]
-pb_status pb_null_build(const pb_stack_equations *stack, pb_warnings *warnings,
-                        pb_null_basis *out, pb_error *err);
+pb_status pb_null_build(const pb_stack_equations *stack, pb_warnings *warnings, pb_null_basis *out,
+                        pb_error *err);
 void pb_null_clear(pb_null_basis *basis);
 
 // Fills system (sizes and matrices) with the stack projected on null(G). [init]

@@ -39,9 +39,11 @@ pb_status pb_layout_build(const pb_plant *plant, pb_layout *out, pb_error *err) 
     out->size += joint->super.element->size;
   }
   if (out->size <= largest_size) return PB_OK;
-  pb_status st = pb_fail(err, PB_ERR_SCHEMA, "/components",
-                         "%zu coordinates, elements' modes included, are more than the %zu that dense "
-                         "matrices can serve", out->size, largest_size);
+  pb_status st =
+      pb_fail(err, PB_ERR_SCHEMA, "/components",
+              "%zu coordinates, elements' modes included, are more than the %zu that dense "
+              "matrices can serve",
+              out->size, largest_size);
   pb_layout_clear(out);
   return st;
 }

@@ -2,9 +2,9 @@
 //
 // Coordinates of each component, in this order:
 //   rigid_body     v (centre of mass, world), θ (world)
-//   strut_1dof     v (point of the lower half at the centre, world), θ, d (upper half against lower, z)
-//   apa_2dof       v, θ, d, w (intermediate mass against lower half, z)
-//   super_element  the element's own, in part axes
+//   strut_1dof     v (point of the lower half at the centre, world), θ, d (upper half against
+//   lower, z) apa_2dof       v, θ, d, w (intermediate mass against lower half, z) super_element the
+//   element's own, in part axes
 // A connection that is an element has the element's coordinates, in joint axes.
 #ifndef PB_ASSEMBLY_MOTION_H
 #define PB_ASSEMBLY_MOTION_H

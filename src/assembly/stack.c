@@ -62,7 +62,8 @@ static void add_pair(double *a, size_t n, size_t i, size_t j, double value) {
 }
 
 // apa_2dof and strut_1dof [report 2.4]. With d the motion of the upper half and w that of the
-// intermediate mass against the lower half: shell on d, actuator stacks on w, sensor stack on d − w.
+// intermediate mass against the lower half: shell on d, actuator stacks on w, sensor stack on d −
+// w.
 static void stack_strut(pb_stack_equations *s, const pb_component *c, size_t start) {
   const pb_strut *p = &c->strut;
   size_t n = s->n, d = start + 6, w = start + 7;
@@ -103,9 +104,8 @@ static pb_status stack_element(pb_stack_equations *s, const pb_super_element *su
   size_t m = e->size, n = s->n;
   double *c = calloc(m * m, sizeof *c);
   if (!c) return pb_fail_memory(err, e->file);
-  pb_status st = super->modal_damping > 0
-                     ? pb_element_damping(e, super->modal_damping, c, err)
-                     : PB_OK;
+  pb_status st =
+      super->modal_damping > 0 ? pb_element_damping(e, super->modal_damping, c, err) : PB_OK;
   for (size_t j = 0; j < m && !st; j++) {
     for (size_t i = 0; i < m; i++) {
       size_t at = start + i + (start + j) * n, from = i + j * m;
@@ -187,8 +187,8 @@ static pb_status check_coincidence(const pb_plant *plant, const pb_connection *c
     const double *p = c->joint.super.element->position;
     for (int i = 0; i < 3; i++)
       for (int a = 0; a < 3; a++)
-        span[i] += c->rotation[i + 3 * a] *
-                   (p[a + 3 * c->joint.node[1]] - p[a + 3 * c->joint.node[0]]);
+        span[i] +=
+            c->rotation[i + 3 * a] * (p[a + 3 * c->joint.node[1]] - p[a + 3 * c->joint.node[0]]);
   }
   for (int i = 0; i < 3; i++) gap = hypot(gap, to[i] - from[i] - span[i]);
   if (gap <= 1e-6) return PB_OK;
@@ -246,8 +246,8 @@ static pb_status allocate(pb_stack_equations *s, pb_error *err) {
 
 pb_status pb_stack_build(const pb_plant *plant, const pb_layout *layout, pb_warnings *warnings,
                          pb_stack_equations *out, pb_error *err) {
-  *out = (pb_stack_equations){
-      .n = layout->size, .nu = plant->input_count, .ny = plant->output_count};
+  *out =
+      (pb_stack_equations){.n = layout->size, .nu = plant->input_count, .ny = plant->output_count};
   pb_status st = allocate(out, err);
   for (size_t i = 0; i < plant->component_count && !st; i++)
     st = stack_component(out, &plant->component[i], layout->component[i], err);

@@ -7,14 +7,14 @@
 #include "assembly/motion.h"
 
 typedef struct pb_stack_equations {
-  size_t n, nu, ny;       // stacked coordinates, inputs, outputs
-  double *m, *c, *k;      // n × n
-  double *f;              // n × nu
-  double *y[3];           // n × ny: transposed Y_0, Y_1, Y_2
-  double *d;              // ny × nu
+  size_t n, nu, ny;   // stacked coordinates, inputs, outputs
+  double *m, *c, *k;  // n × n
+  double *f;          // n × nu
+  double *y[3];       // n × ny: transposed Y_0, Y_1, Y_2
+  double *d;          // ny × nu
   size_t constraints, capacity;
-  double *g;              // n × constraints: one constraint a column, of unit norm
-  const char **owner;     // [constraints] JSON pointer of the connection behind each
+  double *g;           // n × constraints: one constraint a column, of unit norm
+  const char **owner;  // [constraints] JSON pointer of the connection behind each
 } pb_stack_equations;
 
 // Stacks components, joints and signals of the plant. [init]

@@ -1,9 +1,9 @@
 // Signals in stacked coordinates: where inputs push, and what outputs see.
 //
-// A voltage on an actuator is a force ±g_a V on the two ends of its actuator stacks; a sensor voltage is
-// g_s times the elongation of the sensor stack. With `polarity` −1 (an amplified actuator that gets
-// shorter as its stacks expand) both change sign, so that V_a > 0 extends the strut and V_s > 0 is
-// tension.  [report 1.2, 2.4]
+// A voltage on an actuator is a force ±g_a V on the two ends of its actuator stacks; a sensor
+// voltage is g_s times the elongation of the sensor stack. With `polarity` −1 (an amplified
+// actuator that gets shorter as its stacks expand) both change sign, so that V_a > 0 extends the
+// strut and V_s > 0 is tension.  [report 1.2, 2.4]
 #include <math.h>
 
 #include "assembly/stack.h"
@@ -40,9 +40,10 @@ static pb_status warn_axis(const pb_plant *plant, const pb_component *c, const p
     for (int k = 0; k < 3; k++)
       along += c->pose.rotation[i + 3 * k] * stack->axis[k] * (b[i] - a[i]);
   if (along > 0) return PB_OK;
-  return pb_warn(warnings, err, c->pointer,
-                 "a stack's axis does not point from its first frame to its second: the signs of its "
-                 "force and elongation are as the axis says");
+  return pb_warn(
+      warnings, err, c->pointer,
+      "a stack's axis does not point from its first frame to its second: the signs of its "
+      "force and elongation are as the axis says");
 }
 
 static void actuate(const pb_plant *plant, const pb_layout *layout, const pb_port *port,
@@ -55,7 +56,8 @@ static void actuate(const pb_plant *plant, const pb_layout *layout, const pb_por
     add_elongation(column, plant, layout, port->component, c->super.actuator.frame,
                    c->super.actuator.axis, gain);
   } else if (c->type == PB_APA_2DOF) {
-    column[start + 7] += voltage ? c->strut.g_a : 1;  // pushes lower half and intermediate mass apart
+    column[start + 7] +=
+        voltage ? c->strut.g_a : 1;  // pushes lower half and intermediate mass apart
   } else {
     column[start + 6] += 1;
   }
@@ -85,8 +87,8 @@ static void sense_voltage(const pb_plant *plant, const pb_layout *layout, const 
   }
 }
 
-// strut_1dof: the sensor in series with k, c and f measures f_m = k d + c ḋ − f. apa_2dof: the force in
-// the sensor stack, k_e d_e + c_e ḋ_e.
+// strut_1dof: the sensor in series with k, c and f measures f_m = k d + c ḋ − f. apa_2dof: the
+// force in the sensor stack, k_e d_e + c_e ḋ_e.
 static void sense_force(const pb_plant *plant, const pb_layout *layout, const pb_port *port,
                         size_t output, pb_stack_equations *s) {
   const pb_component *c = &plant->component[port->component];

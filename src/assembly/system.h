@@ -3,8 +3,9 @@
 //   M q̈ + C q̇ + K q = F u
 //   y = Y_0 q + Y_1 q̇ + Y_2 q̈ + D u
 //
-// Built from a pb_plant: component coordinates are stacked, locked joint directions give G q = 0, and
-// with N an orthonormal basis of null(G), q = N q_r: M_r = NᵀMN and so on. Column-major matrices.
+// Built from a pb_plant: component coordinates are stacked, locked joint directions give G q = 0,
+// and with N an orthonormal basis of null(G), q = N q_r: M_r = NᵀMN and so on. Column-major
+// matrices.
 #ifndef PB_ASSEMBLY_SYSTEM_H
 #define PB_ASSEMBLY_SYSTEM_H
 

@@ -7,8 +7,8 @@
 
 const char *pb_status_name(pb_status code) {
   switch (code) {
-#define PB_STATUS_NAME(name, text)                                                                 \
-  case PB_##name:                                                                                  \
+#define PB_STATUS_NAME(name, text) \
+  case PB_##name:                  \
     return #name;
     PB_STATUS_LIST(PB_STATUS_NAME)
 #undef PB_STATUS_NAME
@@ -18,8 +18,8 @@ const char *pb_status_name(pb_status code) {
 
 const char *pb_status_text(pb_status code) {
   switch (code) {
-#define PB_STATUS_TEXT(name, text)                                                                 \
-  case PB_##name:                                                                                  \
+#define PB_STATUS_TEXT(name, text) \
+  case PB_##name:                  \
     return text;
     PB_STATUS_LIST(PB_STATUS_TEXT)
 #undef PB_STATUS_TEXT

@@ -1,8 +1,9 @@
 // Status codes, errors and warnings of the library.
 //
-// Every fallible function returns a pb_status and takes a pb_error last. On failure its arguments and
-// the caller's state are unchanged and its outputs are empty. The library never prints or exits: what
-// it has to say reaches the caller in a pb_error (one, fatal) or a pb_warnings (many, not fatal).
+// Every fallible function returns a pb_status and takes a pb_error last. On failure its arguments
+// and the caller's state are unchanged and its outputs are empty. The library never prints or
+// exits: what it has to say reaches the caller in a pb_error (one, fatal) or a pb_warnings (many,
+// not fatal).
 #ifndef PB_BASE_STATUS_H
 #define PB_BASE_STATUS_H
 
@@ -10,18 +11,18 @@
 #include <stddef.h>
 
 // name, short text; the enum, pb_status_name and pb_status_text all come from this one list.
-#define PB_STATUS_LIST(X)                                                                          \
-  X(OK, "no error")                                                                                \
-  X(ERR_MEMORY, "out of memory")                                                                   \
-  X(ERR_IO, "a file cannot be read or written")                                                    \
-  X(ERR_SYNTAX, "the text is not well-formed")                                                     \
-  X(ERR_SCHEMA, "a key is unknown, missing, of the wrong type or out of range")                    \
-  X(ERR_REFERENCE, "a name refers to nothing")                                                     \
-  X(ERR_GEOMETRY, "the geometry does not close")                                                   \
-  X(ERR_ELEMENT, "an element's matrices are not usable")                                           \
-  X(ERR_SINGULAR, "the equations are singular")                                                    \
-  X(ERR_NUMERIC, "a numerical method did not converge")                                            \
-  X(ERR_ARGUMENT, "an argument is out of range")                                                   \
+#define PB_STATUS_LIST(X)                                                       \
+  X(OK, "no error")                                                             \
+  X(ERR_MEMORY, "out of memory")                                                \
+  X(ERR_IO, "a file cannot be read or written")                                 \
+  X(ERR_SYNTAX, "the text is not well-formed")                                  \
+  X(ERR_SCHEMA, "a key is unknown, missing, of the wrong type or out of range") \
+  X(ERR_REFERENCE, "a name refers to nothing")                                  \
+  X(ERR_GEOMETRY, "the geometry does not close")                                \
+  X(ERR_ELEMENT, "an element's matrices are not usable")                        \
+  X(ERR_SINGULAR, "the equations are singular")                                 \
+  X(ERR_NUMERIC, "a numerical method did not converge")                         \
+  X(ERR_ARGUMENT, "an argument is out of range")                                \
   X(ERR_STATE, "not possible in the present state")
 
 typedef enum pb_status {

@@ -31,7 +31,9 @@ void pb_text_append_n(pb_text *t, const char *s, size_t n) {
   t->text[t->length] = '\0';
 }
 
-void pb_text_append(pb_text *t, const char *s) { pb_text_append_n(t, s, strlen(s)); }
+void pb_text_append(pb_text *t, const char *s) {
+  pb_text_append_n(t, s, strlen(s));
+}
 
 void pb_text_format(pb_text *t, const char *format, ...) {
   va_list args, again;
@@ -68,8 +70,7 @@ pb_status pb_text_read(const char *path, char **text, size_t *length, pb_error *
   pb_text t = {0};
   char buffer[4096];
   size_t n;
-  while (!t.failed && t.length <= largest_file &&
-         (n = fread(buffer, 1, sizeof buffer, file)) > 0)
+  while (!t.failed && t.length <= largest_file && (n = fread(buffer, 1, sizeof buffer, file)) > 0)
     pb_text_append_n(&t, buffer, n);
   int failed = ferror(file);
   fclose(file);

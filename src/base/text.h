@@ -25,8 +25,8 @@ char *pb_text_copy(const char *s);
 // A double with the fewest digits (15 to 17) that read back to the same value.
 void pb_text_number(char *out, size_t size, double value);
 
-// The whole of a file of at most 256 MiB, terminated, owned by the caller; PB_ERR_IO names the file.
-// [init]
+// The whole of a file of at most 256 MiB, terminated, owned by the caller; PB_ERR_IO names the
+// file. [init]
 pb_status pb_text_read(const char *path, char **text, size_t *length, pb_error *err);
 
 #endif

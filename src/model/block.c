@@ -13,7 +13,8 @@ static const double split_bound = 1e4;
 static const double eigenvector_rcond = 1e-6;
 
 static pb_status fail_convergence(const char *context, pb_error *err) {
-  return pb_fail(err, PB_ERR_NUMERIC, context, "the eigenvalues of the damped plant did not converge");
+  return pb_fail(err, PB_ERR_NUMERIC, context,
+                 "the eigenvalues of the damped plant did not converge");
 }
 
 // LAPACK takes NaN without a word, and eigenvalues that are NaN pair up with nothing.
@@ -133,7 +134,8 @@ static bool decouple(const double *t, size_t n, size_t first, size_t last, doubl
 }
 
 // Applies [[I, X], [0, I]]: the block is decoupled, and the later columns of the basis change.
-static void apply_split(double *t, double *q, size_t n, size_t first, size_t last, const double *x) {
+static void apply_split(double *t, double *q, size_t n, size_t first, size_t last,
+                        const double *x) {
   int rows = (int)n, p = (int)(last - first), rest = (int)(n - last);
   double one = 1;
   dgemm_("N", "N", &rows, &rest, &p, &one, q + first * n, &rows, x, &p, &one, q + last * n, &rows);

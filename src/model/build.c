@@ -11,7 +11,9 @@
 
 static const double two_pi = 6.283185307179586476925286766559;
 
-static void *array(size_t count, size_t size) { return calloc(count ? count : 1, size); }
+static void *array(size_t count, size_t size) {
+  return calloc(count ? count : 1, size);
+}
 
 pb_model *pb_model_allocate(size_t nx, size_t nu, size_t ny, size_t modes, size_t blocks,
                             size_t values) {
@@ -207,8 +209,9 @@ static bool all_finite(const double *x, size_t n) {
 static pb_status check_finite(const pb_model *m, pb_error *err) {
   size_t values = m->block_value[m->blocks];
   if (!all_finite(m->a, values) || !all_finite(m->ad, values))
-    return pb_fail(err, PB_ERR_NUMERIC, "/components",
-                   "masses, stiffnesses and dampings are too far apart: the state matrix overflows");
+    return pb_fail(
+        err, PB_ERR_NUMERIC, "/components",
+        "masses, stiffnesses and dampings are too far apart: the state matrix overflows");
   for (size_t i = 0; i < m->nu; i++)
     if (!all_finite(m->b + i * m->nx, m->nx) || !all_finite(m->bd + i * m->nx, m->nx))
       return pb_fail(err, PB_ERR_NUMERIC, "/inputs", "what %s does to the plant overflows",

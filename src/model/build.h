@@ -5,8 +5,8 @@
 #include "model/model.h"
 
 typedef struct pb_model_builder {
-  pb_model *model;      // blocks in the order in which they came, not discretised
-  size_t capacity;      // of model->a
+  pb_model *model;  // blocks in the order in which they came, not discretised
+  size_t capacity;  // of model->a
 } pb_model_builder;
 
 // One diagonal block: a size × size (leading dimension lda), b size × nu (ldb), c ny × size (ldc).
@@ -16,29 +16,31 @@ typedef struct pb_model_part {
   size_t lda, ldb, ldc;
 } pb_model_part;
 
-// A zeroed model of these sizes, blocks to come; the caller fills name, signals, rates, modes and d.
+// A zeroed model of these sizes, blocks to come; the caller fills name, signals, rates, modes and
+// d.
 pb_status pb_model_builder_open(pb_model_builder *builder, size_t nx, size_t nu, size_t ny,
                                 size_t modes, pb_error *err);
 
 pb_status pb_model_builder_add(pb_model_builder *builder, const pb_model_part *part, pb_error *err);
 
-// Sorts the blocks by natural frequency, 2 × 2 blocks first; replaces those above max_frequency (Hz; 0:
-// none) by their static contribution; discretises. The builder is empty afterwards.
+// Sorts the blocks by natural frequency, 2 × 2 blocks first; replaces those above max_frequency
+// (Hz; 0: none) by their static contribution; discretises. The builder is empty afterwards.
 pb_status pb_model_builder_close(pb_model_builder *builder, double max_frequency, pb_model **out,
                                  pb_error *err);
 
 // Frees what an unfinished builder holds.
 void pb_model_builder_discard(pb_model_builder *builder);
 
-// Allocates a model and all its arrays for these sizes; a, ad have `values` entries. NULL on failure.
+// Allocates a model and all its arrays for these sizes; a, ad have `values` entries. NULL on
+// failure.
 pb_model *pb_model_allocate(size_t nx, size_t nu, size_t ny, size_t modes, size_t blocks,
                             size_t values);
 
 // Fills ad and bd from a, b and sample_rate.
 pb_status pb_model_discretize(pb_model *model, pb_error *err);
 
-// Natural frequency of a block in rad/s: |det A|^(1/n) for n ≤ 2, else the root mean square entry of a
-// row, which for the normal matrices at hand is that of its eigenvalues.
+// Natural frequency of a block in rad/s: |det A|^(1/n) for n ≤ 2, else the root mean square entry
+// of a row, which for the normal matrices at hand is that of its eigenvalues.
 double pb_block_frequency(const double *a, size_t size);
 
 #endif

@@ -90,11 +90,11 @@ static double add_block(const pb_channel *ch, size_t block, double complex s, do
   const double *b = &ch->b[first * m], *c = &ch->c[first * m];
   double largest = 0;
   block_inverse(ch, block, s, w);
-  for (size_t k = 0; k < size * m; k++) { // X = W B, state by state
+  for (size_t k = 0; k < size * m; k++) {  // X = W B, state by state
     x[k] = 0;
     for (size_t j = 0; j < size; j++) x[k] += w[k / m + j * size] * b[j * m + k % m];
   }
-  for (size_t k = 0; dh && k < size * m; k++) { // W² B
+  for (size_t k = 0; dh && k < size * m; k++) {  // W² B
     x2[k] = 0;
     for (size_t j = 0; j < size; j++) x2[k] += w[k / m + j * size] * x[j * m + k % m];
   }
@@ -173,7 +173,8 @@ static void mean_logarithms(const pb_channel *ch, double *mean, double complex *
   for (size_t k = 0; k < ch->m * ch->m; k++) mean[k] = 0;
   for (int p = 0; p < SCALE_POINTS; p++) {
     double w = low * pow(high / low, (p + 0.5) / SCALE_POINTS);
-    pb_channel_evaluate(ch, w * (0.1 + I), h, NULL, &size); // off the axis: no resonance stands out
+    pb_channel_evaluate(ch, w * (0.1 + I), h, NULL,
+                        &size);  // off the axis: no resonance stands out
     for (size_t k = 0; k < ch->m * ch->m; k++) mean[k] += log(cabs(h[k])) / SCALE_POINTS;
   }
   for (size_t k = 0; k < ch->m * ch->m; k++) {

@@ -16,14 +16,14 @@
 #include "model/model.h"
 
 typedef struct pb_channel {
-  size_t m, n, blocks; // inputs = outputs, states, diagonal blocks
-  size_t widest;       // states of the largest block
-  size_t *start;       // [blocks + 1] first state of each block
-  size_t *value;       // [blocks + 1] first entry of each block in a
-  double *a;           // the blocks, column-major
-  double *b, *c;       // [n][m] each: row i of B, column i of C
-  double *d;           // m × m
-  double *radius;      // [blocks] |det A_b|^(1/size), rad/s: where the block resonates
+  size_t m, n, blocks;  // inputs = outputs, states, diagonal blocks
+  size_t widest;        // states of the largest block
+  size_t *start;        // [blocks + 1] first state of each block
+  size_t *value;        // [blocks + 1] first entry of each block in a
+  double *a;            // the blocks, column-major
+  double *b, *c;        // [n][m] each: row i of B, column i of C
+  double *d;            // m × m
+  double *radius;       // [blocks] |det A_b|^(1/size), rad/s: where the block resonates
   double complex *work;
   int *pivot;
 } pb_channel;

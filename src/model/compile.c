@@ -2,8 +2,8 @@
 //
 // Each mode has the states [s η, η̇] with s = ω (1 rad/s for a rigid-body mode), so that both weigh
 // alike:  A = [[0, s], [−ω²/s, −Ĉ]].  Modes that Ĉ does not couple are 2 × 2 blocks as they are.
-// Modes that it couples (non-proportional damping) form a group whose matrix is block-diagonalised by
-// its complex eigenvectors, in real form.
+// Modes that it couples (non-proportional damping) form a group whose matrix is block-diagonalised
+// by its complex eigenvectors, in real form.
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -18,10 +18,12 @@
 
 static const double two_pi = 6.283185307179586476925286766559;
 
-static double state_scale(const pb_modes *m, size_t j) { return m->omega[j] > 0 ? m->omega[j] : 1; }
+static double state_scale(const pb_modes *m, size_t j) {
+  return m->omega[j] > 0 ? m->omega[j] : 1;
+}
 
-// Two modes count as coupled above 1e-12 of the geometric mean of their frequencies: what is dropped
-// changes a damping ratio of 1e-3 by less than 1e-9 of itself.
+// Two modes count as coupled above 1e-12 of the geometric mean of their frequencies: what is
+// dropped changes a damping ratio of 1e-3 by less than 1e-9 of itself.
 static bool coupled(const pb_modes *m, size_t i, size_t j) {
   double size = sqrt(state_scale(m, i) * state_scale(m, j));
   return fabs(m->damping[i + j * m->n]) > 1e-12 * size;
@@ -32,7 +34,8 @@ static size_t find(size_t *parent, size_t i) {
   return i;
 }
 
-// group[j]: number of the group of mode j, in order of the groups' first modes. Returns their count.
+// group[j]: number of the group of mode j, in order of the groups' first modes. Returns their
+// count.
 static size_t find_groups(const pb_modes *m, size_t *parent, size_t *group) {
   for (size_t i = 0; i < m->n; i++) parent[i] = i;
   for (size_t j = 0; j < m->n; j++)
@@ -82,8 +85,8 @@ static pb_status group_new(const pb_modes *m, const size_t *mode, size_t count, 
   return pb_fail_memory(err, "");
 }
 
-// States are laid out mode by mode, the fastest first: on a matrix graded so, the QR algorithm finds the
-// small eigenvalues to an accuracy of their own instead of that of the largest.
+// States are laid out mode by mode, the fastest first: on a matrix graded so, the QR algorithm
+// finds the small eigenvalues to an accuracy of their own instead of that of the largest.
 static void group_fill(const pb_modes *m, group_system *g) {
   size_t count = g->modes, n = g->n, ny = m->ny;
   for (size_t j = 0; j < count; j++) {
@@ -204,7 +207,8 @@ static void fill_feedthrough(const pb_system *s, const pb_modes *m, double *d) {
   dgemm_("N", "N", &ny, &nu, &n, &one, m->output[2], &ny, m->force, &n, &one, d, &ny);
 }
 
-static pb_status fill_header(const pb_system *s, const pb_modes *m, pb_model *model, pb_error *err) {
+static pb_status fill_header(const pb_system *s, const pb_modes *m, pb_model *model,
+                             pb_error *err) {
   const pb_plant *p = s->plant;
   model->name = pb_text_copy(p->name);
   if (!model->name) return pb_fail_memory(err, "/name");
@@ -212,8 +216,7 @@ static pb_status fill_header(const pb_system *s, const pb_modes *m, pb_model *mo
   model->dof = s->n;
   for (size_t j = 0; j < m->n; j++) {
     model->mode_hz[j] = m->omega[j] / two_pi;
-    model->mode_damping[j] =
-        m->omega[j] > 0 ? m->damping[j + j * m->n] / (2 * m->omega[j]) : 0;
+    model->mode_damping[j] = m->omega[j] > 0 ? m->damping[j + j * m->n] / (2 * m->omega[j]) : 0;
   }
   fill_feedthrough(s, m, model->d);
   pb_status st = copy_signals(p->input, s->nu, model->input, err);

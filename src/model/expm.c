@@ -46,11 +46,20 @@ static double one_norm(size_t n, const double *a) {
   return norm;
 }
 
-static const double pade[14] = {64764752532480000.0, 32382376266240000.0, 7771770303897600.0,
-                                1187353796428800.0,  129060195264000.0,   10559470521600.0,
-                                670442572800.0,      33522128640.0,       1323241920.0,
-                                40840800.0,          960960.0,            16380.0,
-                                182.0,               1.0};
+static const double pade[14] = {64764752532480000.0,
+                                32382376266240000.0,
+                                7771770303897600.0,
+                                1187353796428800.0,
+                                129060195264000.0,
+                                10559470521600.0,
+                                670442572800.0,
+                                33522128640.0,
+                                1323241920.0,
+                                40840800.0,
+                                960960.0,
+                                16380.0,
+                                182.0,
+                                1.0};
 
 // x ← e^x in place; work holds 7 n² doubles, pivot n integers. False: the solve failed.
 static bool exponential(size_t size, double *x, double *work, int *pivot) {

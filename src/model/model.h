@@ -1,12 +1,13 @@
-// The compiled plant: modal state space, its exact zero-order-hold discretisation, its state and step.
+// The compiled plant: modal state space, its exact zero-order-hold discretisation, its state and
+// step.
 //
 //   ẋ = A x + B u,  y = C x + D u        A block diagonal: 2×2 blocks, larger ones only where the
 //   x(k+1) = A_d x(k) + B_d u(k)         eigenvectors are too ill-conditioned to separate the modes
 //   y(k)   = C x(k) + D u(k−1)           sampled with the input of the last interval still held
 //
 // A_d = e^{A T}, B_d = ∫₀ᵀ e^{A s} ds B are exact for an input that is constant over each step.
-// A pb_model never changes after it is built: any number of threads may read it. What changes is the
-// pb_state. Matrices are column-major.
+// A pb_model never changes after it is built: any number of threads may read it. What changes is
+// the pb_state. Matrices are column-major.
 #ifndef PB_MODEL_MODEL_H
 #define PB_MODEL_MODEL_H
 
@@ -56,7 +57,8 @@ typedef struct pb_state {
 
 // Compiles an assembled system: modes, modal form, truncation, discretisation. [init]
 // Units: as in the system. Fails with PB_ERR_NUMERIC (an eigenvalue method), PB_ERR_SINGULAR (an
-// indefinite stiffness: the message names the frequency), PB_ERR_MEMORY. *out is owned by the caller.
+// indefinite stiffness: the message names the frequency), PB_ERR_MEMORY. *out is owned by the
+// caller.
 pb_status pb_model_compile(const struct pb_system *system, pb_warnings *warnings, pb_model **out,
                            pb_error *err);
 
@@ -72,7 +74,8 @@ int pb_model_output(const pb_model *model, const char *name);
 // Size in bytes of a state of this model. [any]
 size_t pb_state_bytes(const pb_model *model);
 
-// A zeroed state (at rest, step 0), owned by the caller (free with free). NULL: out of memory. [init]
+// A zeroed state (at rest, step 0), owned by the caller (free with free). NULL: out of memory.
+// [init]
 pb_state *pb_state_new(const pb_model *model);
 
 // At rest, step 0. [rt]
@@ -95,9 +98,9 @@ typedef enum pb_time_base {
 pb_status pb_model_frf(const pb_model *model, pb_time_base base, const double *hz, size_t nf,
                        double complex *h, pb_error *err);
 
-// H at one complex point s (continuous) or z (sampled), h is [ny][nu], and, when dh is not NULL, its
-// derivative with respect to that point. Infinite at a pole. Models with blocks above 2 × 2 need
-// scratch memory: without it the results are NaN. [init]
+// H at one complex point s (continuous) or z (sampled), h is [ny][nu], and, when dh is not NULL,
+// its derivative with respect to that point. Infinite at a pole. Models with blocks above 2 × 2
+// need scratch memory: without it the results are NaN. [init]
 void pb_model_evaluate(const pb_model *model, pb_time_base base, double complex point,
                        double complex *h, double complex *dh);
 
@@ -115,8 +118,8 @@ pb_status pb_model_truncate(const pb_model *model, double hz, pb_model **out, pb
 // clients that have no element files: *data owned by the caller (free). [init]
 pb_status pb_model_pack(const pb_model *model, double **data, size_t *count, pb_error *err);
 
-// Inverse of pack; names and units are given apart ([nu] and [ny] strings each, copied). Refuses with
-// PB_ERR_SYNTAX any array that is not a consistent model. [init]
+// Inverse of pack; names and units are given apart ([nu] and [ny] strings each, copied). Refuses
+// with PB_ERR_SYNTAX any array that is not a consistent model. [init]
 pb_status pb_model_unpack(const double *data, size_t count, const char *name,
                           const char *const *input_name, const char *const *input_unit,
                           const char *const *output_name, const char *const *output_unit,

@@ -25,7 +25,8 @@ static pb_status eigen(const pb_system *s, double *omega2, double *shape, pb_err
   memcpy(shape, s->k, bytes);
   dsygvd_(&type, "V", "U", &n, shape, &n, mass, &n, omega2, work, &lwork, iwork, &liwork, &info);
   if (info > n)
-    st = pb_fail(err, PB_ERR_SINGULAR, "/components", "the assembled mass matrix is not positive definite");
+    st = pb_fail(err, PB_ERR_SINGULAR, "/components",
+                 "the assembled mass matrix is not positive definite");
   else if (info)
     st = pb_fail(err, PB_ERR_NUMERIC, "", "the modes of the plant did not converge");
 done:
@@ -35,10 +36,10 @@ done:
   return st;
 }
 
-// A solver for all eigenvalues at once errs by a multiple of ε ω_max², which is 1e-9 of a 100 Hz mode
-// beside one at 300 kHz. Jacobi rotations on S = ΦᵀKΦ, which is diagonal to that error and computed
-// entry by entry, restore the slow modes to their own accuracy (as one-sided methods do: Demmel and
-// Veselić, SIAM J. Matrix Anal. Appl. 13, 1992).
+// A solver for all eigenvalues at once errs by a multiple of ε ω_max², which is 1e-9 of a 100 Hz
+// mode beside one at 300 kHz. Jacobi rotations on S = ΦᵀKΦ, which is diagonal to that error and
+// computed entry by entry, restore the slow modes to their own accuracy (as one-sided methods do:
+// Demmel and Veselić, SIAM J. Matrix Anal. Appl. 13, 1992).
 static void rotate(double *x, double *y, size_t n, double c, double s) {
   for (size_t i = 0; i < n; i++) {
     double xi = x[i], yi = y[i];
@@ -119,8 +120,8 @@ static void orthonormalize_slow(const pb_system *s, double *shape, size_t slow,
   }
 }
 
-// The rows of S that belong to slow modes again, in extended precision: they are small differences of
-// large products, as when a stiff element hardly deforms.
+// The rows of S that belong to slow modes again, in extended precision: they are small differences
+// of large products, as when a stiff element hardly deforms.
 static void recompute_slow(const pb_system *s, const double *shape, size_t slow, double *stiffness,
                            long double *product) {
   size_t n = s->n;
@@ -190,8 +191,9 @@ static pb_status clean(const pb_system *s, double *omega2, const double *shape, 
                      hz);
     } else if (omega2[j] < 0) {
       omega2[j] = 0;
-      pb_status st = pb_warn(warnings, err, "/components",
-                             "a mode at −%.3g Hz, an element's rigid-body residual, counts as 0", hz);
+      pb_status st =
+          pb_warn(warnings, err, "/components",
+                  "a mode at −%.3g Hz, an element's rigid-body residual, counts as 0", hz);
       if (st) return st;
     }
     m->omega[j] = sqrt(omega2[j]);

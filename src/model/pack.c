@@ -1,7 +1,8 @@
 // A compiled model as one array of doubles, for the bus: see model.h.
 //
 // Layout: magic, sample_rate, max_frequency, dof, nx, nu, ny, blocks, values; mode_hz [dof],
-// mode_damping [dof]; block sizes [blocks]; a [values]; b; c; d. The discretisation follows from it.
+// mode_damping [dof]; block sizes [blocks]; a [values]; b; c; d. The discretisation follows from
+// it.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -43,8 +44,8 @@ pb_status pb_model_pack(const pb_model *m, double **data, size_t *count, pb_erro
   if (!at) return pb_fail_memory(err, "model");
   *data = at;
   *count = size;
-  const double header[HEADER] = {magic,          m->sample_rate, m->max_frequency,
-                                 (double)m->dof, (double)m->nx,  (double)m->nu,
+  const double header[HEADER] = {magic,          m->sample_rate,    m->max_frequency,
+                                 (double)m->dof, (double)m->nx,     (double)m->nu,
                                  (double)m->ny,  (double)m->blocks, (double)values};
   put(&at, header, HEADER);
   put(&at, m->mode_hz, m->modes);
@@ -58,7 +59,9 @@ pb_status pb_model_pack(const pb_model *m, double **data, size_t *count, pb_erro
   return PB_OK;
 }
 
-static bool whole(double x, double low) { return x >= low && x <= LARGEST && x == floor(x); }
+static bool whole(double x, double low) {
+  return x >= low && x <= LARGEST && x == floor(x);
+}
 
 // Sizes out of the header: dof, nx, nu, ny, blocks, values; consistent with count.
 static bool read_sizes(const double *data, size_t count, size_t size[6]) {

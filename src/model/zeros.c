@@ -29,12 +29,12 @@ static const double pi = 3.14159265358979323846;
 static const double unseen = 1e-9;
 
 typedef struct finder {
-  const pb_channel *channel;              // the exact one
-  double slowest, middle;                 // smallest and mean |λ| of its blocks, rad/s
-  double reach;                           // how far polishing may move a candidate, relative
-  double complex *h, *dh, *u, *vh, *work; // m × m; svd
+  const pb_channel *channel;               // the exact one
+  double slowest, middle;                  // smallest and mean |λ| of its blocks, rad/s
+  double reach;                            // how far polishing may move a candidate, relative
+  double complex *h, *dh, *u, *vh, *work;  // m × m; svd
   double *sigma, *rwork;
-  double complex *zero; // found: imaginary part ≥ 0, both of a pair stand for one entry
+  double complex *zero;  // found: imaginary part ≥ 0, both of a pair stand for one entry
   size_t count;
 } finder;
 
@@ -89,7 +89,7 @@ static pb_status pencil_zeros(const pb_channel *ch, double w, double complex *s,
 // Singular values of h (destroyed) and the vectors of all of them.
 static bool decompose(finder *f) {
   int m = (int)f->channel->m, lwork = 16 * m + 64, info = 0;
-  if (m == 1) { // uᴴ h v = h: the plain Newton method
+  if (m == 1) {  // uᴴ h v = h: the plain Newton method
     f->sigma[0] = cabs(f->h[0]);
     f->u[0] = f->vh[0] = 1;
     return true;

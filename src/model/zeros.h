@@ -9,7 +9,7 @@
 #include "base/status.h"
 #include "model/model.h"
 
-enum { PB_ZEROS_DIRECT = 420 }; // states up to which all zeros are found
+enum { PB_ZEROS_DIRECT = 420 };  // states up to which all zeros are found
 
 // Zeros in rad/s of the continuous-time model from input[count] to output[count] (indices into the
 // model's lists), ascending in magnitude, conjugates adjacent (positive imaginary part first).

@@ -253,7 +253,8 @@ static pb_status read_super(pb_loader *loader, const pb_reader *r, pb_component 
   if (!st) st = read_frames(r, c);
   if (!st) st = read_stacks(r, c);
   if (!st) st = read_ends(r, &c->super);
-  // Its ends are also its bottom and top, as those of the lumped actuators, unless the file says else.
+  // Its ends are also its bottom and top, as those of the lumped actuators, unless the file says
+  // else.
   if (!st && c->super.has_ends && pb_component_frame(c, "bottom") < 0)
     st = add_frame(c, "bottom", zero, c->super.ends[0], 0, r->err);
   if (!st && c->super.has_ends && pb_component_frame(c, "top") < 0)

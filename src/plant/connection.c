@@ -13,9 +13,9 @@ typedef struct rates {
   double c_f, c_t, c_a, c_s;
 } rates;
 
-#define PB_RATES(suffix)                                                                           \
-  {"k_" #suffix, offsetof(rates, k_##suffix), PB_NON_NEGATIVE, false, 0}, {                        \
-    "c_" #suffix, offsetof(rates, c_##suffix), PB_NON_NEGATIVE, false, 0                           \
+#define PB_RATES(suffix)                                                    \
+  {"k_" #suffix, offsetof(rates, k_##suffix), PB_NON_NEGATIVE, false, 0}, { \
+    "c_" #suffix, offsetof(rates, c_##suffix), PB_NON_NEGATIVE, false, 0    \
   }
 
 static const pb_field bending[] = {PB_RATES(f)};
@@ -128,9 +128,9 @@ static pb_status open_joint(pb_loader *loader, const pb_reader *connection, pb_r
   char where[256];
   const cJSON *joint = pb_reader_find(connection, "joint", where);
   if (!joint)
-    return pb_fail(loader->err, PB_ERR_SCHEMA, where, "missing; expected a model's name or a joint");
-  if (!cJSON_IsString(joint))
-    return pb_reader_open(joint, where, loader->models, out, loader->err);
+    return pb_fail(loader->err, PB_ERR_SCHEMA, where,
+                   "missing; expected a model's name or a joint");
+  if (!cJSON_IsString(joint)) return pb_reader_open(joint, where, loader->models, out, loader->err);
   const cJSON *model = loader->models ? pb_json_member(loader->models, joint->valuestring) : NULL;
   if (!model)
     return pb_fail(loader->err, PB_ERR_REFERENCE, where, "there is no model \"%s\"",
@@ -184,7 +184,8 @@ static pb_status read_axes(const pb_reader *r, const pb_plant *plant, pb_connect
 
 pb_status pb_loader_connection(pb_loader *loader, const cJSON *object, const char *name,
                                const pb_plant *plant, pb_connection *out) {
-  static const char *const known[] = {"from", "to", "joint", "quaternion", "z_axis", "x_axis", NULL};
+  static const char *const known[] = {"from",   "to",     "joint", "quaternion",
+                                      "z_axis", "x_axis", NULL};
   char pointer[256];
   pb_json_pointer(pointer, sizeof pointer, "/connections", name);
   pb_reader r, joint;

@@ -25,7 +25,8 @@ static double asymmetry(const double *x, size_t n) {
 
 static void symmetrize(double *x, size_t n) {
   for (size_t j = 0; j < n; j++)
-    for (size_t i = 0; i < j; i++) x[i + j * n] = x[j + i * n] = 0.5 * (x[i + j * n] + x[j + i * n]);
+    for (size_t i = 0; i < j; i++)
+      x[i + j * n] = x[j + i * n] = 0.5 * (x[i + j * n] + x[j + i * n]);
 }
 
 // Mass and centre of mass from RᵀMR, R the rigid motions of the interface frames: the translations
@@ -56,7 +57,8 @@ static void measure_mass(pb_element *e) {
   }
   double mass = (g[0][0] + g[1][1] + g[2][2]) / 3;
   e->health.mass = mass;
-  // ½m|v + ω×c|²: the product of v_x and ω_y is m c_z, that of v_y and ω_z is m c_x, of v_z and ω_x m c_y.
+  // ½m|v + ω×c|²: the product of v_x and ω_y is m c_z, that of v_y and ω_z is m c_x, of v_z and ω_x
+  // m c_y.
   e->health.center[0] = mass != 0 ? 0.5 * (g[1][5] - g[2][4]) / mass : 0;
   e->health.center[1] = mass != 0 ? 0.5 * (g[2][3] - g[0][5]) / mass : 0;
   e->health.center[2] = mass != 0 ? 0.5 * (g[0][4] - g[1][3]) / mass : 0;
@@ -112,8 +114,9 @@ static pb_status warn_health(const pb_element *e, pb_warnings *warnings, pb_erro
   pb_status st = PB_OK;
   double worst = fmax(h->asymmetry_k, h->asymmetry_m);
   if (worst > 1e-9)
-    st = pb_warn(warnings, err, e->file,
-                 "K and M are symmetric to %.1e only; the mean with their transpose is used", worst);
+    st =
+        pb_warn(warnings, err, e->file,
+                "K and M are symmetric to %.1e only; the mean with their transpose is used", worst);
   if (!st && (fabs(h->rigid_hz) > 1e-2 * fabs(h->flexible_hz) || fabs(h->rigid_hz) > 10))
     st = pb_warn(warnings, err, e->file,
                  "rigid-body motions of the free element appear at %.3g Hz instead of 0 (first "

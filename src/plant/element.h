@@ -21,21 +21,22 @@ typedef struct pb_element_health {
 } pb_element_health;
 
 typedef struct pb_element {
-  size_t users;       // reference count
-  char *file;         // path as resolved
-  size_t frames;      // n
-  size_t size;        // m = 6n + p
-  double *position;   // 3 × n, column-major: interface frames in part axes, m
-  double *k, *m;      // size × size, symmetric
-  double *omega2;     // [size] eigenvalues of the free element, (rad/s)², ascending
-  double *shape;      // size × size, ΦᵀMΦ = I
+  size_t users;      // reference count
+  char *file;        // path as resolved
+  size_t frames;     // n
+  size_t size;       // m = 6n + p
+  double *position;  // 3 × n, column-major: interface frames in part axes, m
+  double *k, *m;     // size × size, symmetric
+  double *omega2;    // [size] eigenvalues of the free element, (rad/s)², ascending
+  double *shape;     // size × size, ΦᵀMΦ = I
   pb_element_health health;
 } pb_element;
 
 // Reads K, M and int_xyz from a MAT v5 file (other variables, MATLAB objects too, are ignored) and
 // checks them. Warnings: asymmetry, rigid-body residual. [init]
 // Fails with PB_ERR_IO (file), PB_ERR_SYNTAX (not a MAT file, variables missing or of the wrong
-// shape), PB_ERR_ELEMENT (not finite, M not positive definite), PB_ERR_MEMORY; the error names the file.
+// shape), PB_ERR_ELEMENT (not finite, M not positive definite), PB_ERR_MEMORY; the error names the
+// file.
 pb_status pb_element_load(const char *path, pb_warnings *warnings, pb_element **out, pb_error *err);
 
 // The same from matrices in memory (copied): position 3 × frames, k and m size × size. [init]

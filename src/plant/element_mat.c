@@ -53,7 +53,8 @@ static bool copy_sparse(const matvar_t *v, matrix *out) {
 
 static bool copy_full(const matvar_t *v, matrix *out) {
   bool ok = v->data != NULL;
-  for (size_t i = 0; ok && i < out->rows * out->cols; i++) out->p[i] = entry(v->data, v->data_type, i, &ok);
+  for (size_t i = 0; ok && i < out->rows * out->cols; i++)
+    out->p[i] = entry(v->data, v->data_type, i, &ok);
   return ok;
 }
 
@@ -110,8 +111,9 @@ static uint32_t word(const unsigned char *p, bool little) {
                 : (uint32_t)p[0] << 24 | (uint32_t)p[1] << 16 | (uint32_t)p[2] << 8 | p[3];
 }
 
-// matio fills what a cut file lacks without a word. A MAT v5 file is a header of 128 bytes and elements,
-// each with its length in front: they must end where the file ends. Other versions are left to matio.
+// matio fills what a cut file lacks without a word. A MAT v5 file is a header of 128 bytes and
+// elements, each with its length in front: they must end where the file ends. Other versions are
+// left to matio.
 static pb_status check_complete(const char *path, pb_error *err) {
   unsigned char header[128], tag[8];
   struct stat kind;  // a pipe would block whoever opens it, a device never end
@@ -139,7 +141,8 @@ done:
   return st;
 }
 
-pb_status pb_element_load(const char *path, pb_warnings *warnings, pb_element **out, pb_error *err) {
+pb_status pb_element_load(const char *path, pb_warnings *warnings, pb_element **out,
+                          pb_error *err) {
   *out = NULL;
   matrix k = {0}, m = {0}, xyz = {0};
   double *position = NULL;

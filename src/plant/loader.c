@@ -46,8 +46,8 @@ pb_status pb_loader_element(pb_loader *loader, const pb_reader *r, pb_element **
 }
 
 pb_status pb_loader_damping(const pb_reader *r, pb_super_element *super) {
-  static const pb_field modal[] = {{"modal_damping", offsetof(pb_super_element, modal_damping),
-                                    PB_NON_NEGATIVE, false, 0}};
+  static const pb_field modal[] = {
+      {"modal_damping", offsetof(pb_super_element, modal_damping), PB_NON_NEGATIVE, false, 0}};
   static const pb_field rayleigh[] = {
       {"alpha", offsetof(pb_super_element, alpha), PB_NON_NEGATIVE, false, 0},
       {"beta", offsetof(pb_super_element, beta), PB_NON_NEGATIVE, false, 0}};
@@ -90,13 +90,14 @@ static pb_status rotation_from_quaternion(const pb_reader *r, const cJSON *value
   for (int i = 0; i < 4; i++) norm += q[i] * q[i];
   norm = sqrt(norm);
   if (!(fabs(norm - 1) < 1e-3))
-    return pb_fail(r->err, PB_ERR_SCHEMA, where, "expected a unit quaternion [w,x,y,z], not one of "
-                   "length %g", norm);
+    return pb_fail(r->err, PB_ERR_SCHEMA, where,
+                   "expected a unit quaternion [w,x,y,z], not one of "
+                   "length %g",
+                   norm);
   double w = q[0] / norm, x = q[1] / norm, y = q[2] / norm, z = q[3] / norm;
-  const double out[9] = {
-      1 - 2 * (y * y + z * z), 2 * (x * y + w * z),     2 * (x * z - w * y),
-      2 * (x * y - w * z),     1 - 2 * (x * x + z * z), 2 * (y * z + w * x),
-      2 * (x * z + w * y),     2 * (y * z - w * x),     1 - 2 * (x * x + y * y)};
+  const double out[9] = {1 - 2 * (y * y + z * z), 2 * (x * y + w * z),     2 * (x * z - w * y),
+                         2 * (x * y - w * z),     1 - 2 * (x * x + z * z), 2 * (y * z + w * x),
+                         2 * (x * z + w * y),     2 * (y * z - w * x),     1 - 2 * (x * x + y * y)};
   memcpy(rotation, out, sizeof out);
   return PB_OK;
 }
@@ -115,7 +116,8 @@ pb_status pb_loader_orientation(const pb_reader *r, double rotation[9], bool *gi
   if (quaternion) return rotation_from_quaternion(r, quaternion, where, rotation);
   if (has_x && !has_z) {
     pb_reader_find(r, "x_axis", where);
-    return pb_fail(r->err, PB_ERR_SCHEMA, where, "x_axis is a hint beside z_axis, which is missing");
+    return pb_fail(r->err, PB_ERR_SCHEMA, where,
+                   "x_axis is a hint beside z_axis, which is missing");
   }
   if (rotation_from_axes(z, hint, rotation)) return PB_OK;
   pb_reader_find(r, has_x ? "x_axis" : "z_axis", where);
@@ -135,6 +137,6 @@ pb_status pb_loader_check_model(pb_loader *loader, const cJSON *model, const cha
   if (st || component || joint) return st;
   char where[256];
   pb_json_pointer(where, sizeof where, pointer, "type");
-  return pb_fail(loader->err, PB_ERR_SCHEMA, where,
-                 "\"%s\" is no type of a component or joint", type);
+  return pb_fail(loader->err, PB_ERR_SCHEMA, where, "\"%s\" is no type of a component or joint",
+                 type);
 }

@@ -1,4 +1,5 @@
-// Between the parts of the plant loader: reading components, joints and signals, expanding templates.
+// Between the parts of the plant loader: reading components, joints and signals, expanding
+// templates.
 #ifndef PB_PLANT_LOADER_H
 #define PB_PLANT_LOADER_H
 
@@ -7,12 +8,12 @@
 
 // What every part of the loader needs: models, where element files are, and elements already read.
 typedef struct pb_loader {
-  const cJSON *models;     // may be NULL
-  const char *directory;   // of relative element paths
+  const cJSON *models;    // may be NULL
+  const char *directory;  // of relative element paths
   pb_warnings *warnings;
   pb_error *err;
   size_t element_count;
-  pb_element **element;    // one user each; files are read once
+  pb_element **element;  // one user each; files are read once
 } pb_loader;
 
 // The element of the reader's key "file", loaded once per file; one more user for the caller.
@@ -25,16 +26,16 @@ pb_status pb_loader_damping(const pb_reader *r, pb_super_element *super);
 // *given tells whether there were any; without, the rotation is the identity.
 pb_status pb_loader_orientation(const pb_reader *r, double rotation[9], bool *given);
 
-// Checks a model by itself: its type, its keys, its numbers; keys that are missing may come from the
-// object that names it.
+// Checks a model by itself: its type, its keys, its numbers; keys that are missing may come from
+// the object that names it.
 pb_status pb_loader_check_model(pb_loader *loader, const cJSON *model, const char *pointer);
 
 // The two halves of pb_loader_check_model: *known tells whether `type` is one of theirs.
 pb_status pb_loader_check_component_model(const pb_reader *r, const char *type, bool *known);
 pb_status pb_loader_check_joint_model(const pb_reader *r, const char *type, bool *known);
 
-// Fills *out (zeroed by the caller) from the component `name`; on failure what was allocated stays in
-// *out for pb_component_clear.
+// Fills *out (zeroed by the caller) from the component `name`; on failure what was allocated stays
+// in *out for pb_component_clear.
 pb_status pb_loader_component(pb_loader *loader, const cJSON *object, const char *name,
                               pb_component *out);
 void pb_component_clear(pb_component *component);
@@ -54,8 +55,8 @@ pb_status pb_loader_signal(pb_loader *loader, const cJSON *object, const char *p
 void pb_port_clear(pb_port *port);
 
 // Expands "template": *out is a copy of the plant file's object with the template's components,
-// connections and signals, changed by the file's own entries of the same name; without a template, a
-// plain copy.
+// connections and signals, changed by the file's own entries of the same name; without a template,
+// a plain copy.
 pb_status pb_loader_expand(const cJSON *file, cJSON **out, pb_error *err);
 
 #endif

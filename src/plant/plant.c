@@ -44,8 +44,8 @@ static pb_status read_header(const cJSON *file, pb_plant *p, pb_error *err) {
   pb_status st = pb_reader_open(file, "", NULL, &r, err);
   if (!st) st = pb_reader_string(&r, "schema", true, &schema);
   if (!st && strcmp(schema, "plantbus.plant/1"))
-    st = pb_fail(err, PB_ERR_SCHEMA, "/schema", "\"%s\" is not known; expected \"plantbus.plant/1\"",
-                 schema);
+    st = pb_fail(err, PB_ERR_SCHEMA, "/schema",
+                 "\"%s\" is not known; expected \"plantbus.plant/1\"", schema);
   if (!st) st = pb_reader_known(&r, known, plant_fields, 1);
   if (!st) st = pb_reader_string(&r, "name", true, &name);
   if (!st) st = pb_reader_fields(&r, plant_fields, 1, p, false);
@@ -62,7 +62,9 @@ static pb_status read_header(const cJSON *file, pb_plant *p, pb_error *err) {
 }
 
 // calloc for `count` members, at least one.
-static void *new_list(size_t count, size_t size) { return calloc(count ? count : 1, size); }
+static void *new_list(size_t count, size_t size) {
+  return calloc(count ? count : 1, size);
+}
 
 static pb_status read_components(pb_loader *loader, const cJSON *object, pb_plant *p) {
   size_t count = (size_t)cJSON_GetArraySize(object);
@@ -71,8 +73,7 @@ static pb_status read_components(pb_loader *loader, const cJSON *object, pb_plan
   p->component = new_list(count, sizeof *p->component);
   if (!p->component) return pb_fail_memory(loader->err, "/components");
   for (const cJSON *m = object->child; m; m = m->next) {
-    pb_status st =
-        pb_loader_component(loader, m, m->string, &p->component[p->component_count++]);
+    pb_status st = pb_loader_component(loader, m, m->string, &p->component[p->component_count++]);
     if (st) return st;
   }
   return PB_OK;
@@ -93,8 +94,8 @@ static pb_status read_connections(pb_loader *loader, const cJSON *object, pb_pla
 static pb_status read_signals(pb_loader *loader, const cJSON *list, bool is_input, pb_plant *p) {
   const char *section = is_input ? "/inputs" : "/outputs";
   size_t count = list ? (size_t)cJSON_GetArraySize(list) : 0;
-  size_t limit = is_input ? PB_MAX_INPUTS : PB_MAX_OUTPUTS, *n = is_input ? &p->input_count
-                                                                          : &p->output_count;
+  size_t limit = is_input ? PB_MAX_INPUTS : PB_MAX_OUTPUTS,
+         *n = is_input ? &p->input_count : &p->output_count;
   if (!count || count > limit)
     return pb_fail(loader->err, PB_ERR_SCHEMA, section, "expected 1 to %zu signals, not %zu", limit,
                    count);
@@ -114,7 +115,8 @@ static pb_status read_signals(pb_loader *loader, const cJSON *list, bool is_inpu
   return PB_OK;
 }
 
-// Replaces a relative "file" of an object by its absolute path, so that the text loads from anywhere.
+// Replaces a relative "file" of an object by its absolute path, so that the text loads from
+// anywhere.
 static pb_status absolute_file(cJSON *object, const char *directory, pb_error *err) {
   cJSON *file = cJSON_GetObjectItemCaseSensitive(object, "file");
   if (!cJSON_IsString(file) || file->valuestring[0] == '/') return PB_OK;
@@ -198,7 +200,8 @@ pb_status pb_plant_load(const char *path, pb_warnings *warnings, pb_plant **out,
   copy = pb_text_copy(path);
   st = copy ? pb_plant_parse(text, length, dirname(copy), warnings, out, err)
             : pb_fail_memory(err, path);
-  if (st == PB_ERR_SYNTAX && err && !err->where[0]) snprintf(err->where, sizeof err->where, "%s", path);
+  if (st == PB_ERR_SYNTAX && err && !err->where[0])
+    snprintf(err->where, sizeof err->where, "%s", path);
   free(copy);
   free(text);
   return st;

@@ -10,19 +10,20 @@
 #include "base/status.h"
 #include "plant/element.h"
 
-#define PB_MAX_INPUTS 32   // of the bus's Sample and Command types
+#define PB_MAX_INPUTS 32  // of the bus's Sample and Command types
 #define PB_MAX_OUTPUTS 64
 
 typedef struct pb_pose {
-  double position[3];     // m, world
-  double rotation[9];     // column-major 3 × 3, columns are the part's x, y, z in world axes
+  double position[3];  // m, world
+  double rotation[9];  // column-major 3 × 3, columns are the part's x, y, z in world axes
 } pb_pose;
 
 typedef struct pb_frame {
   char *name;
-  double position[3];  // rigid_body: in body axes; apa_2dof, strut_1dof: on z; super_element: offset
-  size_t node;         // super_element: interface frame, 0-based
-  int half;            // apa_2dof, strut_1dof: 0 lower, 1 upper half
+  double
+      position[3];  // rigid_body: in body axes; apa_2dof, strut_1dof: on z; super_element: offset
+  size_t node;      // super_element: interface frame, 0-based
+  int half;         // apa_2dof, strut_1dof: 0 lower, 1 upper half
 } pb_frame;
 
 typedef enum pb_component_type {
@@ -33,20 +34,20 @@ typedef enum pb_component_type {
 } pb_component_type;
 
 typedef struct pb_rigid_body {
-  double mass;          // kg
-  double inertia[9];    // kg m², about the centre of mass, body axes, column-major
-  double center[3];     // centre of mass, body axes, m
+  double mass;        // kg
+  double inertia[9];  // kg m², about the centre of mass, body axes, column-major
+  double center[3];   // centre of mass, body axes, m
 } pb_rigid_body;
 
 // Keys of apa_2dof (report 2.4) and strut_1dof; what a type does not have is 0.
 typedef struct pb_strut {
-  double k_1, c_1;              // shell (strut_1dof: k, c), N/m, Ns/m
-  double k_a, c_a;              // actuator stacks
-  double k_e, c_e;              // sensor stack
-  double g_a, g_s;              // N/V, V/m
-  double mass;                  // kg, both halves
-  double intermediate_mass;     // kg
-  double radius, length;        // m
+  double k_1, c_1;           // shell (strut_1dof: k, c), N/m, Ns/m
+  double k_a, c_a;           // actuator stacks
+  double k_e, c_e;           // sensor stack
+  double g_a, g_s;           // N/V, V/m
+  double mass;               // kg, both halves
+  double intermediate_mass;  // kg
+  double radius, length;     // m
 } pb_strut;
 
 typedef struct pb_stack {
@@ -60,10 +61,10 @@ typedef struct pb_super_element {
   double modal_damping;  // ξ
   double alpha, beta;    // Rayleigh: C = αM + βK
   pb_stack actuator, sensor;
-  double g_a, g_s;       // N/V, V/m
-  double polarity;       // +1 or −1
-  size_t ends[2];        // bottom and top interface frames, 0-based
-  double half_height;    // m; 0: not given
+  double g_a, g_s;     // N/V, V/m
+  double polarity;     // +1 or −1
+  size_t ends[2];      // bottom and top interface frames, 0-based
+  double half_height;  // m; 0: not given
   bool has_ends;
 } pb_super_element;
 
@@ -100,8 +101,8 @@ typedef enum pb_joint_type {
 
 typedef struct pb_joint {
   pb_joint_type type;
-  bool locked[6];       // x y z rx ry rz in joint axes: a constraint
-  double k[6], c[6];    // of the free directions
+  bool locked[6];          // x y z rx ry rz in joint axes: a constraint
+  double k[6], c[6];       // of the free directions
   pb_super_element super;  // PB_JOINT_ELEMENT: element and damping
   size_t node[2];          // PB_JOINT_ELEMENT: interface frame at from, at to, 0-based
 } pb_joint;
@@ -133,10 +134,10 @@ typedef struct pb_port {
   char *name;
   char *pointer;
   pb_signal_type type;
-  int component;         // actuator and sensor signals
-  pb_anchor frame;       // the others; `to` of relative_displacement
-  pb_anchor from;        // relative_displacement
-  double direction[3];   // unit vector, world axes
+  int component;        // actuator and sensor signals
+  pb_anchor frame;      // the others; `to` of relative_displacement
+  pb_anchor from;       // relative_displacement
+  double direction[3];  // unit vector, world axes
 } pb_port;
 
 typedef struct pb_plant {
@@ -155,7 +156,8 @@ typedef struct pb_plant {
 // PB_ERR_ELEMENT, PB_ERR_MEMORY; err->where is the JSON pointer of the offender.
 pb_status pb_plant_load(const char *path, pb_warnings *warnings, pb_plant **out, pb_error *err);
 
-// The same from a text; element paths are relative to directory (NULL: the working directory). [init]
+// The same from a text; element paths are relative to directory (NULL: the working directory).
+// [init]
 pb_status pb_plant_parse(const char *text, size_t length, const char *directory,
                          pb_warnings *warnings, pb_plant **out, pb_error *err);
 

@@ -9,8 +9,7 @@ pb_status pb_reader_open(const cJSON *object, const char *pointer, const cJSON *
                          pb_reader *out, pb_error *err) {
   *out = (pb_reader){.own = object, .err = err};
   snprintf(out->own_pointer, sizeof out->own_pointer, "%s", pointer);
-  if (!cJSON_IsObject(object))
-    return pb_fail(err, PB_ERR_SCHEMA, pointer, "expected an object");
+  if (!cJSON_IsObject(object)) return pb_fail(err, PB_ERR_SCHEMA, pointer, "expected an object");
   const cJSON *name = pb_json_member(object, "model");
   if (!name) return PB_OK;
   char where[256];

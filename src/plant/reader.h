@@ -1,7 +1,8 @@
 // Reading typed values out of JSON objects with errors that name the place.
 //
-// A component or a joint may say "model": NAME and override single keys: a pb_reader looks a key up in
-// the object itself and then in the model behind it, and its errors point at where the value stands.
+// A component or a joint may say "model": NAME and override single keys: a pb_reader looks a key up
+// in the object itself and then in the model behind it, and its errors point at where the value
+// stands.
 #ifndef PB_PLANT_READER_H
 #define PB_PLANT_READER_H
 

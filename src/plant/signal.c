@@ -61,7 +61,8 @@ static pb_status read_type(const pb_reader *r, bool is_input, const type_entry *
 static bool can_carry(const pb_component *c, pb_signal_type type, const char **why) {
   const pb_super_element *s = c->type == PB_SUPER_ELEMENT ? &c->super : NULL;
   bool lumped = c->type == PB_APA_2DOF || c->type == PB_STRUT_1DOF;
-  *why = "the component is no actuator: expected apa_2dof, strut_1dof or a super_element with stacks";
+  *why =
+      "the component is no actuator: expected apa_2dof, strut_1dof or a super_element with stacks";
   if (!lumped && !s) return false;
   switch (type) {
   case PB_ACTUATOR_VOLTAGE:

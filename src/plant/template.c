@@ -1,8 +1,9 @@
 // Reading the template "nano_hexapod": see template.h.
 //
-// Joint centres lie on two circles. Base pairs stand at 210°, 330°, 90° ± base_half_angle, top pairs
-// at 270°, 30°, 150° ± top_half_angle; strut k joins base[k] to top[k] of the lists below. A strut's
-// axes: z from base to top joint, y = ẑ_world × z.  [report 2.6; plant file, section "Template"]
+// Joint centres lie on two circles. Base pairs stand at 210°, 330°, 90° ± base_half_angle, top
+// pairs at 270°, 30°, 150° ± top_half_angle; strut k joins base[k] to top[k] of the lists below. A
+// strut's axes: z from base to top joint, y = ẑ_world × z.  [report 2.6; plant file, section
+// "Template"]
 #include "plant/template.h"
 
 #include <math.h>
@@ -30,8 +31,8 @@ static const pb_field template_fields[] = {
     {"point_of_interest_height", offsetof(pb_hexapod, point_of_interest_height), PB_ANY, true, 0},
 };
 
-static pb_status read_part(const pb_reader *r, const char *key, const pb_field *fields, size_t count,
-                           void *out) {
+static pb_status read_part(const pb_reader *r, const char *key, const pb_field *fields,
+                           size_t count, void *out) {
   char where[256];
   pb_reader part;
   const cJSON *object = pb_reader_find(r, key, where);
@@ -80,7 +81,8 @@ static pb_status read_actuator(pb_hexapod *h, const cJSON *models, pb_error *err
   st = pb_reader_number(&r, &half, &h->half_height);
   if (st) return st;
   const cJSON *ends = pb_reader_find(&r, "ends", where);
-  if (!ends) return pb_fail(err, PB_ERR_SCHEMA, where, "missing; a strut needs [bottom, top] nodes");
+  if (!ends)
+    return pb_fail(err, PB_ERR_SCHEMA, where, "missing; a strut needs [bottom, top] nodes");
   return pb_json_numbers(ends, where, 2, h->ends, err);
 }
 

@@ -1,15 +1,16 @@
-// Expanding the template "nano_hexapod": six struts between a base and a platform, a payload on top.
+// Expanding the template "nano_hexapod": six struts between a base and a platform, a payload on
+// top.
 //
-// The expansion is JSON again: components, connections and signals as a user could have written them,
-// over which the file's own entries of the same name are merged ("strut 3 only").
+// The expansion is JSON again: components, connections and signals as a user could have written
+// them, over which the file's own entries of the same name are merged ("strut 3 only").
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "plant/template.h"
 
-// Building the expansion. Each helper returns the new object or NULL (out of memory); NULL parents are
-// passed over, so that failures are noticed once, by `ok`.
+// Building the expansion. Each helper returns the new object or NULL (out of memory); NULL parents
+// are passed over, so that failures are noticed once, by `ok`.
 typedef struct builder {
   cJSON *components, *connections, *inputs, *outputs;
   bool ok;
@@ -157,8 +158,7 @@ static void add_strut_signals(builder *b, const pb_hexapod *h) {
   for (int k = 1; k <= 6; k++) {
     snprintf(component, sizeof component, "strut%d", k);
     snprintf(name, sizeof name, force ? "f%d" : "Va%d", k);
-    cJSON *input =
-        add_signal(b, b->inputs, name, force ? "actuator_force" : "actuator_voltage");
+    cJSON *input = add_signal(b, b->inputs, name, force ? "actuator_force" : "actuator_voltage");
     add_string(b, input, "component", component);
     snprintf(name, sizeof name, force ? "fm%d" : "Vs%d", k);
     cJSON *output = add_signal(b, b->outputs, name, force ? "sensor_force" : "sensor_voltage");
@@ -197,7 +197,8 @@ static int find_signal(const cJSON *list, const char *name) {
   return -1;
 }
 
-// The template's signals, those that the file defines itself in their place, then the file's others.
+// The template's signals, those that the file defines itself in their place, then the file's
+// others.
 static bool merge_signals(cJSON *out, const char *key, const cJSON *generated) {
   cJSON *own = cJSON_DetachItemFromObjectCaseSensitive(out, key);
   cJSON *list = cJSON_CreateArray();

@@ -33,8 +33,8 @@ static int end(void **state) {
   return system(command);
 }
 
-// Runs a tool with these arguments (--domain and --json are added), its standard output into a file;
-// returns what it printed as JSON.
+// Runs a tool with these arguments (--domain and --json are added), its standard output into a
+// file; returns what it printed as JSON.
 static cJSON *run(const char *tool, const char *const *arguments) {
   const char *argv[24] = {tool, "--domain", domain, "--json"};
   char output[64];
@@ -63,11 +63,12 @@ static double number(const cJSON *object, const char *key) {
   return value->valuedouble;
 }
 
-// Within 1 % and 1° of the exact sampled response wherever the coherence is above 0.99 and the response
-// above its noise, which on this noiseless plant is nearly everywhere.
+// Within 1 % and 1° of the exact sampled response wherever the coherence is above 0.99 and the
+// response above its noise, which on this noiseless plant is nearly everywhere.
 static void test_identify(void **state) {
   (void)state;
-  const char *const arguments[] = {"--input", inputs, "--band", "10,300", "--resolution", "1", NULL};
+  const char *const arguments[] = {"--input",      inputs, "--band", "10,300",
+                                   "--resolution", "1",    NULL};
   cJSON *report = run(PB_BIN "/plantbus-identify", arguments);
   const cJSON *agreement = pb_json_member(report, "agreement");
   double magnitude = number(agreement, "magnitude_error_percent");
@@ -88,9 +89,9 @@ static void test_repeat(void **state) {
   for (int i = 0; i < 3; i++) {
     char file[64];
     snprintf(file, sizeof file, "%s/samples", directory);
-    const char *const arguments[] = {"--input", inputs,  "--band", "50,150", "--resolution",   "10",
-                                     "--settle", "0.05", "--seed", i < 2 ? "7" : "8",
-                                     "--save-samples", file, NULL};
+    const char *const arguments[] = {
+        "--input", inputs,   "--band",          "50,150",         "--resolution", "10", "--settle",
+        "0.05",    "--seed", i < 2 ? "7" : "8", "--save-samples", file,           NULL};
     cJSON_Delete(run(PB_BIN "/plantbus-identify", arguments));
     REQUIRE(pb_text_read(file, &samples[i], &length[i], &err));
   }
@@ -104,8 +105,8 @@ static void test_repeat(void **state) {
 // The damping that the closed loop shows is the predicted one, to 5 % of it, mode by mode.
 static void test_iff(void **state) {
   (void)state;
-  static const char *const arguments[] = {"--gain", "400",           "--band", "5,250",
-                                          "--resolution", "1", "--no-open-loop", NULL};
+  static const char *const arguments[] = {"--gain",       "400", "--band",         "5,250",
+                                          "--resolution", "1",   "--no-open-loop", NULL};
   cJSON *report = run(PB_BIN "/plantbus-iff", arguments);
   const cJSON *mode;
   size_t compared = 0;

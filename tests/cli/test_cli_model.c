@@ -37,7 +37,7 @@ static int remove_folder(void **state) {
   (void)state;
   unlink(path_of("stdout"));
   unlink(path_of("stderr"));
-  return rmdir(folder); // fails when a tool left something behind
+  return rmdir(folder);  // fails when a tool left something behind
 }
 
 // ---- running the tool ---------------------------------------------------------------------------
@@ -140,7 +140,7 @@ static void bench(double complex s, double complex h[2][2]) {
   double complex e = k_e + c_e * s;
   double complex a11 = m_i * s * s + k_a + c_a * s + e, a22 = m_u * s * s + k_1 + c_1 * s + e;
   double complex det = bench_det(s);
-  const double force[2][2] = {{g_a, 0}, {0, 1}}; // on z_i, z_u
+  const double force[2][2] = {{g_a, 0}, {0, 1}};  // on z_i, z_u
   for (int i = 0; i < 2; i++) {
     double complex zi = (a22 * force[i][0] + e * force[i][1]) / det;
     double complex zu = (a11 * force[i][1] + e * force[i][0]) / det;
@@ -183,7 +183,7 @@ static void test_modes_poles_zeros(void **state) {
   cJSON *tree = run_json("modes --json " BENCH);
   assert_int_equal(cJSON_GetArraySize(member(tree, "modes_hz")), 2);
   ASSERT_RELATIVE(at(member(tree, "modes_hz"), 1), sqrt((p + q) / 2 + root) / (2 * M_PI), 1e-9);
-  double slow = (p * q - r) / ((p + q) / 2 + root); // without the cancellation of the difference
+  double slow = (p * q - r) / ((p + q) / 2 + root);  // without the cancellation of the difference
   ASSERT_RELATIVE(at(member(tree, "modes_hz"), 0), sqrt(slow) / (2 * M_PI), 1e-9);
   assert_int_equal(cJSON_GetArraySize(member(tree, "damping")), 2);
   cJSON_Delete(tree);

@@ -1,5 +1,5 @@
-// Every allocation of loading, assembling and compiling a plant fails once: each time the call reports
-// it, hands nothing out and leaks nothing (the sanitizers' build sees to the latter).
+// Every allocation of loading, assembling and compiling a plant fails once: each time the call
+// reports it, hands nothing out and leaks nothing (the sanitizers' build sees to the latter).
 #include "support/beam.h"
 #include "support/check.h"
 
@@ -14,13 +14,19 @@ void *__real_realloc(void *p, size_t size);
 
 static long allocations, failing;  // failing: the number of the allocation that fails; 0: none
 
-static bool fails(void) { return ++allocations == failing; }
+static bool fails(void) {
+  return ++allocations == failing;
+}
 
-void *__wrap_malloc(size_t size) { return fails() ? NULL : __real_malloc(size); }
+void *__wrap_malloc(size_t size) {
+  return fails() ? NULL : __real_malloc(size);
+}
 void *__wrap_calloc(size_t count, size_t size) {
   return fails() ? NULL : __real_calloc(count, size);
 }
-void *__wrap_realloc(void *p, size_t size) { return fails() ? NULL : __real_realloc(p, size); }
+void *__wrap_realloc(void *p, size_t size) {
+  return fails() ? NULL : __real_realloc(p, size);
+}
 
 typedef pb_status (*subject)(const char *input, pb_error *err);
 
@@ -96,8 +102,8 @@ static void test_hexapod(void **state) {
 // An element as component and as joint, a massless body, damping of both kinds.
 static void test_elements(void **state) {
   (void)state;
-  static const beam steel = {.length = 0.1, .ea = 2e7, .ei = 50, .gj = 40, .mass = 0.08,
-                             .polar_inertia = 2e-6};
+  static const beam steel = {
+      .length = 0.1, .ea = 2e7, .ei = 50, .gj = 40, .mass = 0.08, .polar_inertia = 2e-6};
   static const char *const text =
       "{\"schema\": \"plantbus.plant/1\", \"name\": \"t\", \"models\": {\"e\": {\"type\": "
       "\"super_element\", \"file\": \"pb-fault.mat\", \"modal_damping\": 0.01}}, \"components\": "
@@ -105,9 +111,11 @@ static void test_elements(void **state) {
       "{\"tip\": {\"node\": 2, \"offset\": [0, 0, 0.01]}}, \"stacks\": {\"actuator\": {\"frames\": "
       "[\"1\", \"2\"], \"axis\": [0, 0, 1]}}, \"g_a\": 1, \"ends\": [1, 2]}, \"a\": {\"type\": "
       "\"rigid_body\", \"mass\": 1, \"inertia\": [1, 1, 1], \"position\": [0, 0, 0.21]}, \"b\": "
-      "{\"type\": \"rigid_body\", \"mass\": 0, \"inertia\": [0, 0, 0], \"position\": [0, 0, 0.21]}}, "
+      "{\"type\": \"rigid_body\", \"mass\": 0, \"inertia\": [0, 0, 0], \"position\": [0, 0, "
+      "0.21]}}, "
       "\"connections\": {\"w\": {\"from\": \"ground\", \"to\": \"beam.1\", \"joint\": {\"type\": "
-      "\"weld\"}}, \"j\": {\"from\": \"beam.tip\", \"to\": \"a\", \"joint\": {\"model\": \"e\", \"nodes\": [1, 2]}}, \"k\": "
+      "\"weld\"}}, \"j\": {\"from\": \"beam.tip\", \"to\": \"a\", \"joint\": {\"model\": \"e\", "
+      "\"nodes\": [1, 2]}}, \"k\": "
       "{\"from\": \"a\", \"to\": \"b\", \"joint\": {\"type\": \"prismatic\", \"k_a\": 5}}}, "
       "\"inputs\": [{\"name\": \"V\", \"type\": \"actuator_voltage\", \"component\": \"beam\"}], "
       "\"outputs\": [{\"name\": \"x\", \"type\": \"acceleration\", \"frame\": \"b\", "

@@ -1,5 +1,5 @@
-// What holds for every plant, whatever its numbers: symmetry, rigid motions, passivity, reciprocity,
-// composition of steps, snapshots, independence of the world's axes.
+// What holds for every plant, whatever its numbers: symmetry, rigid motions, passivity,
+// reciprocity, composition of steps, snapshots, independence of the world's axes.
 #include "support/beam.h"
 #include "support/check.h"
 
@@ -96,8 +96,8 @@ static void test_stable(void **state) {
   }
 }
 
-// Forces and motions at the same point: the response matrix is symmetric (Maxwell, Betti), and its power
-// is never negative (Im of the diagonal ≤ 0).
+// Forces and motions at the same point: the response matrix is symmetric (Maxwell, Betti), and its
+// power is never negative (Im of the diagonal ≤ 0).
 static void test_reciprocity_and_passivity(void **state) {
   (void)state;
   built b = build_shipped(1);
@@ -179,12 +179,12 @@ static void test_snapshots_continue_bit_for_bit(void **state) {
   dispose(&b);
 }
 
-// A free chain of two beams and a mass on a bushing: six rigid-body modes, whatever its pose, and the
-// flexible modes do not depend on the pose.
+// A free chain of two beams and a mass on a bushing: six rigid-body modes, whatever its pose, and
+// the flexible modes do not depend on the pose.
 static void test_six_rigid_modes_in_any_pose(void **state) {
   (void)state;
-  static const beam steel = {.length = 0.1, .ea = 2e7, .ei = 50, .gj = 40, .mass = 0.08,
-                             .polar_inertia = 2e-6};
+  static const beam steel = {
+      .length = 0.1, .ea = 2e7, .ei = 50, .gj = 40, .mass = 0.08, .polar_inertia = 2e-6};
   static const char *const pose[2] = {"\"position\": [0, 0, 0.05]",
                                       "\"position\": [0.04, 0, 0.03], \"z_axis\": [0.8, 0, 0.6]"};
   static const char *const mass_axes[2] = {"", ", \"z_axis\": [0.8, 0, 0.6]"};

@@ -1,10 +1,10 @@
 // A plant against what an independent program computed for it. Argument: the plant's name.
 //
-// DoF and states exactly, modes to 1e-6, frequency responses to 1e-6 of the largest magnitude in their
-// frequency row, step responses to 1e-8 of each output's peak. Some of the step data were made with a
-// matrix exponential of badly scaled matrices and are themselves further off than that: the step
-// response is therefore also computed here in extended precision by another method. The model must meet
-// 1e-8 against that one always, and against the data wherever the data do.
+// DoF and states exactly, modes to 1e-6, frequency responses to 1e-6 of the largest magnitude in
+// their frequency row, step responses to 1e-8 of each output's peak. Some of the step data were
+// made with a matrix exponential of badly scaled matrices and are themselves further off than that:
+// the step response is therefore also computed here in extended precision by another method. The
+// model must meet 1e-8 against that one always, and against the data wherever the data do.
 #include <complex.h>
 #include <math.h>
 #include <setjmp.h>
@@ -124,7 +124,8 @@ static void test_frequency_responses(void **state) {
     real = real->next, imag = imag->next, count++;
   }
   free(h);
-  print_message("%s: %zu frequencies, worst %.1e of the row (1e-6 allowed)\n", r.name, count, worst);
+  print_message("%s: %zu frequencies, worst %.1e of the row (1e-6 allowed)\n", r.name, count,
+                worst);
   assert_true(count > 0 && worst <= 1e-6);
 }
 

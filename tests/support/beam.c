@@ -25,9 +25,9 @@ void beam_matrices(const beam *b, double k[144], double m[144], double position[
   double l = b->length, ei = b->ei, mass = b->mass;
   memset(k, 0, 144 * sizeof *k);
   memset(m, 0, 144 * sizeof *m);
-  const double kb[6] = {12 * ei / (l * l * l), -12 * ei / (l * l * l), 4 * ei / l,
-                        2 * ei / l,            6 * ei / (l * l),       6 * ei / (l * l)};
-  const double mb[6] = {156 * mass / 420,         54 * mass / 420,     4 * l * l * mass / 420,
+  const double kb[6] = {12 * ei / (l * l * l), -12 * ei / (l * l * l), 4 * ei / l, 2 * ei / l,
+                        6 * ei / (l * l),      6 * ei / (l * l)};
+  const double mb[6] = {156 * mass / 420,        54 * mass / 420,     4 * l * l * mass / 420,
                         -3 * l * l * mass / 420, 22 * l * mass / 420, -13 * l * mass / 420};
   bending(k, 0, 4, 1, kb), bending(k, 1, 3, -1, kb);
   bending(m, 0, 4, 1, mb), bending(m, 1, 3, -1, mb);

@@ -6,9 +6,9 @@
 
 // 12 × 12 stiffness and consistent mass, frames at z = ∓length/2, column-major.
 typedef struct beam {
-  double length;              // m
-  double ea, ei, gj;          // N, N m², N m²
-  double mass, polar_inertia; // kg, kg m² (about z)
+  double length;               // m
+  double ea, ei, gj;           // N, N m², N m²
+  double mass, polar_inertia;  // kg, kg m² (about z)
 } beam;
 
 void beam_matrices(const beam *b, double k[144], double m[144], double position[6]);

@@ -2,7 +2,8 @@
 //
 // With M = L Lᵀ, K' = L⁻¹ K L⁻ᵀ, C' alike and q' = Lᵀ q, the state [α q'; q̇'] obeys
 //   A = [[0, α I], [−K'/α, −C']],  α² = ‖K'‖,
-// whose norm is the highest natural frequency; e^{[A b; 0 0] dt} by Taylor series, scaling and squaring.
+// whose norm is the highest natural frequency; e^{[A b; 0 0] dt} by Taylor series, scaling and
+// squaring.
 #include "support/oracle.h"
 
 #include <math.h>

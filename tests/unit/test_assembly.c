@@ -6,7 +6,8 @@
 #include "base/lapack.h"
 #include "model/model.h"
 
-static const beam steel = {.length = 0.1, .ea = 2e7, .ei = 50, .gj = 40, .mass = 0.08, .polar_inertia = 2e-6};
+static const beam steel = {
+    .length = 0.1, .ea = 2e7, .ei = 50, .gj = 40, .mass = 0.08, .polar_inertia = 2e-6};
 static char beam_file[64];
 
 static int setup(void **state) {
@@ -27,7 +28,8 @@ static int teardown(void **state) {
 static pb_status assemble(const char *body, pb_plant **plant, pb_system **system,
                           pb_warnings *warnings, pb_error *err) {
   char text[4096];
-  int n = snprintf(text, sizeof text, "{\"schema\": \"plantbus.plant/1\", \"name\": \"t\", %s}", body);
+  int n =
+      snprintf(text, sizeof text, "{\"schema\": \"plantbus.plant/1\", \"name\": \"t\", %s}", body);
   assert_true(n > 0 && (size_t)n < sizeof text);
   *system = NULL;
   pb_status st = pb_plant_parse(text, (size_t)n, NULL, warnings, plant, err);
@@ -54,9 +56,9 @@ static double compliance(const pb_system *s, size_t o, size_t i) {
   return sum;
 }
 
-#define SIGNALS(frame, direction)                                                                  \
-  "\"inputs\": [{\"name\": \"F\", \"type\": \"force\", \"frame\": \"" frame                        \
-  "\", \"direction\": " direction "}], \"outputs\": [{\"name\": \"x\", \"type\": "                 \
+#define SIGNALS(frame, direction)                                                  \
+  "\"inputs\": [{\"name\": \"F\", \"type\": \"force\", \"frame\": \"" frame        \
+  "\", \"direction\": " direction "}], \"outputs\": [{\"name\": \"x\", \"type\": " \
   "\"displacement\", \"frame\": \"" frame "\", \"direction\": " direction "}]"
 
 // A cantilever in any orientation bends by F L³ / (3 E I) and stretches by F L / (E A).
@@ -98,16 +100,18 @@ static void test_offset_frame(void **state) {
   snprintf(body, sizeof body,
            "\"components\": {\"beam\": {\"type\": \"super_element\", \"file\": \"%s\", \"frames\": "
            "{\"tip\": {\"node\": 3, \"offset\": [0, 0, 0.02]}}}}, \"connections\": {\"wall\": "
-           "{\"from\": \"ground\", \"to\": \"beam.1\", \"joint\": {\"type\": \"weld\"}}}, "
-           SIGNALS("beam.tip", "[1, 0, 0]"), beam_file);
+           "{\"from\": \"ground\", \"to\": \"beam.1\", \"joint\": {\"type\": \"weld\"}}}, " SIGNALS(
+               "beam.tip", "[1, 0, 0]"),
+           beam_file);
   REQUIRE(assemble(body, &p, &s, NULL, &err));
   double l = steel.length, a = 0.02;
   ASSERT_RELATIVE(compliance(s, 0, 0), (l * l * l / 3 + l * l * a + l * a * a) / steel.ei, 1e-9);
   dispose(p, s);
 }
 
-#define BODY(name, extra) "\"" name "\": {\"type\": \"rigid_body\", \"mass\": 2, \"inertia\": [0.1, 0.2, 0.3]" extra "}"
-#define JOINT(name, from, to, joint)                                                               \
+#define BODY(name, extra) \
+  "\"" name "\": {\"type\": \"rigid_body\", \"mass\": 2, \"inertia\": [0.1, 0.2, 0.3]" extra "}"
+#define JOINT(name, from, to, joint) \
   "\"" name "\": {\"from\": \"" from "\", \"to\": \"" to "\", \"joint\": " joint "}"
 
 // Each joint type leaves the degrees of freedom that it names.
@@ -137,10 +141,12 @@ static void test_joint_axes(void **state) {
   (void)state;
   pb_plant *p;
   pb_system *s;
-  REQUIRE(assemble("\"components\": {" BODY("a", "") "}, \"connections\": {\"j\": {\"from\": "
+  REQUIRE(assemble(
+      "\"components\": {" BODY(
+          "a", "") "}, \"connections\": {\"j\": {\"from\": "
                    "\"ground\", \"to\": \"a\", \"z_axis\": [0.6, 0, 0.8], \"joint\": {\"type\": "
                    "\"prismatic\", \"k_a\": 1000}}}, " SIGNALS("a", "[1, 0, 0]"),
-                   &p, &s, NULL, &err));
+      &p, &s, NULL, &err));
   assert_int_equal(s->n, 1);
   ASSERT_RELATIVE(compliance(s, 0, 0), 0.36 / 1000, 1e-12);
   dispose(p, s);
@@ -152,11 +158,20 @@ static void test_redundant_constraints(void **state) {
   pb_plant *p;
   pb_system *s;
   pb_warnings w = {0};
-  REQUIRE(assemble("\"components\": {" BODY("a", "") ", " BODY("b", "") "}, \"connections\": {"
-                   JOINT("one", "a", "b", "{\"type\": \"weld\"}") ", "
-                   JOINT("two", "b", "a", "{\"type\": \"weld\"}") ", "
-                   JOINT("z", "ground", "a", "{\"type\": \"prismatic\", \"k_a\": 100}") "}, "
-                   SIGNALS("b", "[0, 0, 1]"), &p, &s, &w, &err));
+  REQUIRE(
+      assemble(
+          "\"components\": {" BODY("a", "") ", " BODY("b", "") "}, \"connections\": {" JOINT(
+              "one", "a", "b",
+              "{\"type\": \"weld\"}") ", " JOINT("two", "b", "a",
+                                                 "{\"type\": \"weld\"}") ", " JOINT("z", "ground",
+                                                                                    "a",
+                                                                                    "{\"type\": "
+                                                                                    "\"prismatic\","
+                                                                                    " \"k_a\": "
+                                                                                    "100}") "},"
+                                                                                            " " SIGNALS("b",
+                                                                                                        "[0, 0, 1]"),
+          &p, &s, &w, &err));
   assert_int_equal(s->n, 1);
   assert_int_equal(w.count, 0);
   ASSERT_RELATIVE(s->m[0] / (s->f[0] * s->f[0]), 4, 1e-12);
@@ -178,17 +193,29 @@ static void refuse(const char *body, pb_status code, const char *where, const ch
 
 static void test_refusals(void **state) {
   (void)state;
-  refuse("\"components\": {" BODY("a", "") ", " BODY("b", ", \"position\": [0, 0, 2e-6]") "}, "
-         "\"connections\": {" JOINT("gap", "a", "b", "{\"type\": \"weld\"}") "}, "
-         SIGNALS("a", "[0, 0, 1]"), PB_ERR_GEOMETRY, "/connections/gap", "0.002 mm");
-  refuse("\"components\": {" BODY("a", "") "}, \"connections\": {" JOINT("fixed", "ground", "a",
-         "{\"type\": \"weld\"}") "}, " SIGNALS("a", "[0, 0, 1]"), PB_ERR_SINGULAR, "/connections",
-         "no degree of freedom");
-  refuse("\"components\": {" BODY("a", "") ", \"ghost\": {\"type\": \"rigid_body\", \"mass\": 0, "
-         "\"inertia\": [0, 0, 0]}}, \"connections\": {" JOINT("z", "ground", "a",
-         "{\"type\": \"prismatic\", \"k_a\": 100}") ", " JOINT("g", "a", "ghost",
-         "{\"type\": \"prismatic\"}") "}, " SIGNALS("a", "[0, 0, 1]"), PB_ERR_SINGULAR,
-         "/components/ghost", "without mass and without stiffness");
+  refuse("\"components\": {" BODY("a", "") ", " BODY(
+             "b",
+             ", \"position\": [0, 0, 2e-6]") "}, "
+                                             "\"connections\": {" JOINT(
+                                                 "gap", "a", "b",
+                                                 "{\"type\": \"weld\"}") "}, " SIGNALS("a",
+                                                                                       "[0, 0, 1]"),
+         PB_ERR_GEOMETRY, "/connections/gap", "0.002 mm");
+  refuse("\"components\": {" BODY("a", "") "}, \"connections\": {" JOINT(
+             "fixed", "ground", "a", "{\"type\": \"weld\"}") "}, " SIGNALS("a", "[0, 0, 1]"),
+         PB_ERR_SINGULAR, "/connections", "no degree of freedom");
+  refuse("\"components\": {" BODY(
+             "a", "") ", \"ghost\": {\"type\": \"rigid_body\", \"mass\": 0, "
+                      "\"inertia\": [0, 0, 0]}}, \"connections\": {" JOINT(
+                          "z", "ground",
+                          "a", "{\"type\": \"prismatic\", \"k_a\": 100}") ", " JOINT("g", "a",
+                                                                                     "ghost",
+                                                                                     "{\"type\": "
+                                                                                     "\"prismatic\""
+                                                                                     "}") "},"
+                                                                                          " " SIGNALS("a",
+                                                                                                      "[0, 0, 1]"),
+         PB_ERR_SINGULAR, "/components/ghost", "without mass and without stiffness");
 }
 
 // Two springs in series with a massless body between them: k/2, and one degree of freedom.
@@ -196,16 +223,70 @@ static void test_massless_is_condensed(void **state) {
   (void)state;
   pb_plant *p;
   pb_system *s;
-  REQUIRE(assemble("\"components\": {" BODY("a", "") ", \"link\": {\"type\": \"rigid_body\", "
-                   "\"mass\": 0, \"inertia\": [0, 0, 0]}}, \"connections\": {" JOINT(
-                       "lower", "ground", "link", "{\"type\": \"prismatic\", \"k_a\": 300}") ", "
-                   JOINT("upper", "link", "a", "{\"type\": \"prismatic\", \"k_a\": 600}") "}, "
-                   "\"inputs\": [{\"name\": \"F\", \"type\": \"force\", \"frame\": \"a\", "
-                   "\"direction\": [0, 0, 1]}, {\"name\": \"L\", \"type\": \"force\", \"frame\": "
-                   "\"link\", \"direction\": [0, 0, 1]}], \"outputs\": [{\"name\": \"x\", \"type\": "
-                   "\"displacement\", \"frame\": \"a\", \"direction\": [0, 0, 1]}, {\"name\": "
-                   "\"l\", \"type\": \"displacement\", \"frame\": \"link\", \"direction\": [0, 0, "
-                   "1]}]", &p, &s, NULL, &err));
+  REQUIRE(assemble(
+      "\"components\": {" BODY(
+          "a",
+          "") ", \"link\": {\"type\": \"rigid_body\", "
+              "\"mass\": 0, \"inertia\": [0, 0, 0]}}, \"connections\": {" JOINT(
+                  "lower", "ground", "link",
+                  "{\"type\": \"prismatic\", \"k_a\": 300}") ", " JOINT("upper", "link", "a",
+                                                                        "{\"type\": \"prismatic\", "
+                                                                        "\"k_a\": 600}") "}, "
+                                                                                         "\"inputs"
+                                                                                         "\": "
+                                                                                         "[{"
+                                                                                         "\"name\":"
+                                                                                         " \"F\", "
+                                                                                         "\"type\":"
+                                                                                         " \"force"
+                                                                                         "\", "
+                                                                                         "\"frame\""
+                                                                                         ": \"a\", "
+                                                                                         "\"directi"
+                                                                                         "on\": "
+                                                                                         "[0, 0, "
+                                                                                         "1]}, "
+                                                                                         "{\"name\""
+                                                                                         ": \"L\", "
+                                                                                         "\"type\":"
+                                                                                         " \"force"
+                                                                                         "\", "
+                                                                                         "\"frame\""
+                                                                                         ": "
+                                                                                         "\"link\","
+                                                                                         " \"direct"
+                                                                                         "ion\": "
+                                                                                         "[0, 0, "
+                                                                                         "1]}], "
+                                                                                         "\"outputs"
+                                                                                         "\": "
+                                                                                         "[{"
+                                                                                         "\"name\":"
+                                                                                         " \"x\", "
+                                                                                         "\"type\":"
+                                                                                         " "
+                                                                                         "\"displac"
+                                                                                         "ement\", "
+                                                                                         "\"frame\""
+                                                                                         ": \"a\", "
+                                                                                         "\"directi"
+                                                                                         "on\": "
+                                                                                         "[0, 0, "
+                                                                                         "1]}, "
+                                                                                         "{\"name\""
+                                                                                         ": "
+                                                                                         "\"l\", "
+                                                                                         "\"type\":"
+                                                                                         " \"displa"
+                                                                                         "cement\","
+                                                                                         " \"frame"
+                                                                                         "\": "
+                                                                                         "\"link\","
+                                                                                         " \"direct"
+                                                                                         "ion\": "
+                                                                                         "[0, 0, "
+                                                                                         "1]}]",
+      &p, &s, NULL, &err));
   assert_int_equal(s->n, 1);
   ASSERT_RELATIVE(compliance(s, 0, 0), 1 / 200.0, 1e-12);
   ASSERT_RELATIVE(compliance(s, 0, 1), 1 / 300.0, 1e-12);
@@ -219,17 +300,37 @@ static void test_massless_with_many_outputs(void **state) {
   (void)state;
   enum { outputs = 12 };
   char body[4096];
-  int n = snprintf(body, sizeof body,
-                   "\"components\": {" BODY("a", "") ", \"link\": {\"type\": \"rigid_body\", "
-                   "\"mass\": 0, \"inertia\": [0, 0, 0]}}, \"connections\": {" JOINT(
-                       "lower", "ground", "link", "{\"type\": \"prismatic\", \"k_a\": 300}") ", "
-                   JOINT("upper", "link", "a", "{\"type\": \"prismatic\", \"k_a\": 600}") "}, "
-                   "\"inputs\": [{\"name\": \"F\", \"type\": \"force\", \"frame\": \"a\", "
-                   "\"direction\": [0, 0, 1]}], \"outputs\": [");
+  int n = snprintf(
+      body, sizeof body,
+      "\"components\": {" BODY(
+          "a",
+          "") ", \"link\": {\"type\": \"rigid_body\", "
+              "\"mass\": 0, \"inertia\": [0, 0, 0]}}, \"connections\": {" JOINT(
+                  "lower", "ground", "link",
+                  "{\"type\": \"prismatic\", \"k_a\": 300}") ", " JOINT("upper", "link", "a",
+                                                                        "{\"type\": \"prismatic\", "
+                                                                        "\"k_a\": 600}") "}, "
+                                                                                         "\"inputs"
+                                                                                         "\": "
+                                                                                         "[{"
+                                                                                         "\"name\":"
+                                                                                         " \"F\", "
+                                                                                         "\"type\":"
+                                                                                         " \"force"
+                                                                                         "\", "
+                                                                                         "\"frame\""
+                                                                                         ": \"a\", "
+                                                                                         "\"directi"
+                                                                                         "on\": "
+                                                                                         "[0, 0, "
+                                                                                         "1]}], "
+                                                                                         "\"outputs"
+                                                                                         "\": [");
   for (int i = 0; i < outputs; i++)
     n += snprintf(body + n, sizeof body - (size_t)n,
                   "%s{\"name\": \"y%d\", \"type\": \"displacement\", \"frame\": \"%s\", "
-                  "\"direction\": [0, 0, 1]}", i ? ", " : "", i, i % 2 ? "link" : "a");
+                  "\"direction\": [0, 0, 1]}",
+                  i ? ", " : "", i, i % 2 ? "link" : "a");
   snprintf(body + n, sizeof body - (size_t)n, "]");
   pb_plant *p;
   pb_system *s;
@@ -244,12 +345,15 @@ static void test_massless_with_many_outputs(void **state) {
 static void test_element_joint(void **state) {
   (void)state;
   char body[2048];
-  static const char *const form =
-      "\"components\": {" BODY("a", ", \"position\": [0, 0, 0.1]") ", \"foot\": {\"type\": "
-      "\"rigid_body\", \"mass\": 1, \"inertia\": [1, 1, 1]}}, \"connections\": {\"f\": {\"from\": "
-      "\"ground\", \"to\": \"foot\", \"joint\": {\"type\": \"weld\"}}, \"j\": {\"from\": \"foot\", "
-      "\"to\": \"a\", \"joint\": {\"type\": \"super_element\", \"file\": \"%s\", \"nodes\": [%s]}}}, "
-      SIGNALS("a", "[1, 0, 0]");
+  static const char *const form = "\"components\": {" BODY(
+      "a", ", \"position\": [0, 0, 0.1]") ", \"foot\": {\"type\": "
+                                          "\"rigid_body\", \"mass\": 1, \"inertia\": [1, 1, 1]}}, "
+                                          "\"connections\": {\"f\": {\"from\": "
+                                          "\"ground\", \"to\": \"foot\", \"joint\": {\"type\": "
+                                          "\"weld\"}}, \"j\": {\"from\": \"foot\", "
+                                          "\"to\": \"a\", \"joint\": {\"type\": \"super_element\", "
+                                          "\"file\": \"%s\", \"nodes\": [%s]}}}, " SIGNALS(
+                                              "a", "[1, 0, 0]");
   pb_plant *p;
   pb_system *s;
   snprintf(body, sizeof body, form, beam_file, "1, 3");
@@ -279,11 +383,15 @@ static void test_actuator_numbers(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_cantilever),       cmocka_unit_test(test_offset_frame),
-      cmocka_unit_test(test_joint_freedoms),   cmocka_unit_test(test_joint_axes),
-      cmocka_unit_test(test_redundant_constraints), cmocka_unit_test(test_refusals),
+      cmocka_unit_test(test_cantilever),
+      cmocka_unit_test(test_offset_frame),
+      cmocka_unit_test(test_joint_freedoms),
+      cmocka_unit_test(test_joint_axes),
+      cmocka_unit_test(test_redundant_constraints),
+      cmocka_unit_test(test_refusals),
       cmocka_unit_test(test_massless_is_condensed),
-      cmocka_unit_test(test_massless_with_many_outputs), cmocka_unit_test(test_element_joint),
+      cmocka_unit_test(test_massless_with_many_outputs),
+      cmocka_unit_test(test_element_joint),
       cmocka_unit_test(test_actuator_numbers),
   };
   return cmocka_run_group_tests(tests, setup, teardown);

@@ -6,7 +6,8 @@
 
 #include "plant/element.h"
 
-static const beam steel = {.length = 0.1, .ea = 2e7, .ei = 50, .gj = 40, .mass = 0.08, .polar_inertia = 2e-6};
+static const beam steel = {
+    .length = 0.1, .ea = 2e7, .ei = 50, .gj = 40, .mass = 0.08, .polar_inertia = 2e-6};
 static char path[64];
 
 static int setup(void **state) {
@@ -146,7 +147,8 @@ static void test_modal_damping(void **state) {
     for (int b = 0; b < 12; b++) {
       double value = 0, expected = a == b ? 0.04 * sqrt(fmax(e->omega2[a], 0)) : 0;
       for (int i = 0; i < 12; i++)
-        for (int j = 0; j < 12; j++) value += e->shape[i + 12 * a] * c[i + 12 * j] * e->shape[j + 12 * b];
+        for (int j = 0; j < 12; j++)
+          value += e->shape[i + 12 * a] * c[i + 12 * j] * e->shape[j + 12 * b];
       ASSERT_NEAR(value, expected, 1e-9 * 0.04 * sqrt(e->omega2[11]));
     }
   }

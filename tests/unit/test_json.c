@@ -131,10 +131,13 @@ static void test_read_names_the_file(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_refused),         cmocka_unit_test(test_accepted),
+      cmocka_unit_test(test_refused),
+      cmocka_unit_test(test_accepted),
       cmocka_unit_test(test_case_matters),
-      cmocka_unit_test(test_numbers_survive), cmocka_unit_test(test_print),
-      cmocka_unit_test(test_merge),           cmocka_unit_test(test_read_names_the_file),
+      cmocka_unit_test(test_numbers_survive),
+      cmocka_unit_test(test_print),
+      cmocka_unit_test(test_merge),
+      cmocka_unit_test(test_read_names_the_file),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -18,7 +18,8 @@ static pb_status try_compile(const char *body, pb_model **model, pb_error *error
   char text[4096];
   pb_plant *p = NULL;
   pb_system *s = NULL;
-  int n = snprintf(text, sizeof text, "{\"schema\": \"plantbus.plant/1\", \"name\": \"t\", %s}", body);
+  int n =
+      snprintf(text, sizeof text, "{\"schema\": \"plantbus.plant/1\", \"name\": \"t\", %s}", body);
   REQUIRE(pb_plant_parse(text, (size_t)n, NULL, NULL, &p, &err));
   REQUIRE(pb_system_assemble(p, NULL, &s, &err));
   pb_status st = pb_model_compile(s, NULL, model, error);
@@ -34,11 +35,11 @@ static pb_model *compile(const char *body) {
 }
 
 // A mass on a vertical guide with a spring and a damper.
-#define GUIDED(mass, k, c)                                                                         \
-  "\"components\": {\"a\": {\"type\": \"rigid_body\", \"mass\": " mass ", \"inertia\": [1, 1, "  \
-  "1]}}, \"connections\": {\"j\": {\"from\": \"ground\", \"to\": \"a\", \"joint\": {\"type\": "  \
-  "\"prismatic\", \"k_a\": " k ", \"c_a\": " c "}}}, \"inputs\": [{\"name\": \"F\", \"type\": "     \
-  "\"force\", \"frame\": \"a\", \"direction\": [0, 0, 1]}], \"outputs\": [{\"name\": \"y\", "      \
+#define GUIDED(mass, k, c)                                                                      \
+  "\"components\": {\"a\": {\"type\": \"rigid_body\", \"mass\": " mass ", \"inertia\": [1, 1, " \
+  "1]}}, \"connections\": {\"j\": {\"from\": \"ground\", \"to\": \"a\", \"joint\": {\"type\": " \
+  "\"prismatic\", \"k_a\": " k ", \"c_a\": " c "}}}, \"inputs\": [{\"name\": \"F\", \"type\": " \
+  "\"force\", \"frame\": \"a\", \"direction\": [0, 0, 1]}], \"outputs\": [{\"name\": \"y\", "   \
   "\"type\": \"displacement\", \"frame\": \"a\", \"direction\": [0, 0, 1]}]"
 
 // Largest |A V − V blocks| over the largest |A|.
@@ -47,7 +48,8 @@ static double residual(size_t n, const double *a, const double *blocks, const do
   for (size_t j = 0; j < n; j++)
     for (size_t i = 0; i < n; i++) {
       double sum = 0;
-      for (size_t k = 0; k < n; k++) sum += a[i + k * n] * v[k + j * n] - v[i + k * n] * blocks[k + j * n];
+      for (size_t k = 0; k < n; k++)
+        sum += a[i + k * n] * v[k + j * n] - v[i + k * n] * blocks[k + j * n];
       worst = fmax(worst, fabs(sum));
       largest = fmax(largest, fabs(a[i + j * n]));
     }
@@ -65,8 +67,8 @@ static void test_blocks_of_distinct_eigenvalues(void **state) {
   assert_true(residual(4, a, d, v) < 1e-13);
 }
 
-// Two equal Jordan blocks and a distinct eigenvalue: no eigenvector basis, so a larger block, but the
-// distinct one is still told apart.
+// Two equal Jordan blocks and a distinct eigenvalue: no eigenvector basis, so a larger block, but
+// the distinct one is still told apart.
 static void test_blocks_of_a_defective_matrix(void **state) {
   (void)state;
   double a[25] = {0}, d[25], v[25], t[25];
@@ -88,7 +90,8 @@ static void test_blocks_of_a_defective_matrix(void **state) {
   for (int k = 0; k < 5; k++)
     for (int i = k + 1; i < 5; i++) {
       double f = m[i + 5 * k] / m[k + 5 * k];
-      for (int j = 0; j < 5; j++) m[i + 5 * j] -= f * m[k + 5 * j], b[i + 5 * j] -= f * b[k + 5 * j];
+      for (int j = 0; j < 5; j++)
+        m[i + 5 * j] -= f * m[k + 5 * j], b[i + 5 * j] -= f * b[k + 5 * j];
     }
   for (int j = 0; j < 5; j++)
     for (int i = 4; i >= 0; i--) {
@@ -156,7 +159,8 @@ static void test_floating_body(void **state) {
       "\"sample_rate\": 100, \"components\": {\"a\": {\"type\": \"rigid_body\", \"mass\": 4, "
       "\"inertia\": [1, 2, 3]}}, \"inputs\": [{\"name\": \"F\", \"type\": \"force\", \"frame\": "
       "\"a\", \"direction\": [0, 1, 0]}], \"outputs\": [{\"name\": \"x\", \"type\": "
-      "\"displacement\", \"frame\": \"a\", \"direction\": [0, 1, 0]}, {\"name\": \"acc\", \"type\": "
+      "\"displacement\", \"frame\": \"a\", \"direction\": [0, 1, 0]}, {\"name\": \"acc\", "
+      "\"type\": "
       "\"acceleration\", \"frame\": \"a\", \"direction\": [0, 1, 0]}, {\"name\": \"v\", \"type\": "
       "\"velocity\", \"frame\": \"a\", \"direction\": [0, 1, 0]}]");
   double u = 8, y[3], gain[3];
@@ -182,7 +186,8 @@ static void test_critical_damping(void **state) {
       "\"inertia\": [1, 1, 1]}}, \"connections\": {\"j\": {\"from\": \"ground\", \"to\": \"a\", "
       "\"joint\": {\"type\": \"prismatic\", \"k_a\": 100, \"c_a\": 20}}}, \"inputs\": [{\"name\": "
       "\"F\", \"type\": \"force\", \"frame\": \"a\", \"direction\": [0, 0, 1]}], \"outputs\": "
-      "[{\"name\": \"x\", \"type\": \"displacement\", \"frame\": \"a\", \"direction\": [0, 0, 1]}]");
+      "[{\"name\": \"x\", \"type\": \"displacement\", \"frame\": \"a\", \"direction\": [0, 0, "
+      "1]}]");
   double u = 100, y;
   pb_state *s = pb_state_new(m);
   for (int k = 0; k < 100; k++) pb_step_advance(m, s, &u);
@@ -259,7 +264,8 @@ static void test_sampled_response_is_what_steps_do(void **state) {
       "\"inertia\": [1, 1, 1]}}, \"connections\": {\"j\": {\"from\": \"ground\", \"to\": \"a\", "
       "\"joint\": {\"type\": \"prismatic\", \"k_a\": 900, \"c_a\": 12}}}, \"inputs\": [{\"name\": "
       "\"F\", \"type\": \"force\", \"frame\": \"a\", \"direction\": [0, 0, 1]}], \"outputs\": "
-      "[{\"name\": \"a\", \"type\": \"acceleration\", \"frame\": \"a\", \"direction\": [0, 0, 1]}]");
+      "[{\"name\": \"a\", \"type\": \"acceleration\", \"frame\": \"a\", \"direction\": [0, 0, "
+      "1]}]");
   double hz = 7.3, u = 1, y;
   double complex h, sum = 0;
   REQUIRE(pb_model_frf(m, PB_SAMPLED, &hz, 1, &h, &err));
@@ -312,7 +318,8 @@ static void test_pack(void **state) {
     data[i] = kept;
   }
   pb_error err = {0};
-  assert_int_equal(pb_model_unpack(data, count - 1, "copy", in, iu, out, ou, &copy, &err), PB_ERR_SYNTAX);
+  assert_int_equal(pb_model_unpack(data, count - 1, "copy", in, iu, out, ou, &copy, &err),
+                   PB_ERR_SYNTAX);
   free(data);
   pb_model_free(m);
 }

@@ -35,7 +35,7 @@ static int make_folder(void **state) {
 
 static int remove_folder(void **state) {
   (void)state;
-  return rmdir(folder); // fails when a temporary file was left
+  return rmdir(folder);  // fails when a temporary file was left
 }
 
 static char *read_all(const char *path) {
@@ -65,7 +65,7 @@ static void test_csv(void **state) {
     pb_csv_number(&csv, NAN);
     pb_csv_text(&csv, "x,y");
   }
-  assert_int_equal(access(path, F_OK), -1); // not there before it is complete
+  assert_int_equal(access(path, F_OK), -1);  // not there before it is complete
   assert_int_equal(pb_csv_close(&csv, &err), PB_OK);
   char *text = read_all(path), *rest = text, *line = strsep(&rest, "\n");
   assert_string_equal(line, "frequency [Hz],\"Va \"\"1\"\", real [V/V]\",who");
@@ -98,13 +98,13 @@ static void test_csv_failures(void **state) {
   for (int i = 0; i < 10000; i++) pb_csv_number(&csv, i);
   assert_int_equal(pb_csv_close(&csv, &err), PB_ERR_IO);
   assert_string_equal(err.where, "/dev/full");
-  pb_csv_discard(&csv); // harmless after the close
+  pb_csv_discard(&csv);  // harmless after the close
 }
 
 // ---- MAT ----------------------------------------------------------------------------------------
 
 static void write_example(const char *path) {
-  double complex h[2][3][2]; // [nf][ny][nu]
+  double complex h[2][3][2];  // [nf][ny][nu]
   for (int f = 0; f < 2; f++) {
     for (int o = 0; o < 3; o++) {
       for (int i = 0; i < 2; i++) h[f][o][i] = 100 * f + 10 * o + i + 0.5 * I;

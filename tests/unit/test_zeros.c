@@ -13,7 +13,7 @@
 // A model of second-order blocks in companion form, [0 1; −w² −2ζw]; only what the zeros need.
 typedef struct sketch {
   pb_model model;
-  size_t count; // blocks filled
+  size_t count;  // blocks filled
 } sketch;
 
 static sketch sketch_new(size_t modes, size_t nu, size_t ny) {
@@ -102,7 +102,7 @@ static void test_biquad(void **state) {
   check_zero(r.zero[0], root(245, 0.004), 1e-12);
   check_zero(r.zero[1], conj(root(245, 0.004)), 1e-12);
   free(r.zero);
-  r = find_zeros(&k.model, 1, 30); // below 39 Hz
+  r = find_zeros(&k.model, 1, 30);  // below 39 Hz
   assert_int_equal(r.count, 0);
   free(r.zero);
   sketch_free(&k);
@@ -141,12 +141,12 @@ static void test_origin(void **state) {
   add_mode(&k, 500, 0.01, 0, 1, NULL, NULL);
   add_mode(&k, 90000, 0.01, 0, 1, NULL, NULL);
   result r = find_zeros(&k.model, 1, 0);
-  assert_int_equal(r.count, 3); // and the one pair between the two modes
+  assert_int_equal(r.count, 3);  // and the one pair between the two modes
   assert_true(r.zero[0] == 0);
   assert_true(cabs(r.zero[1]) > 500 && cabs(r.zero[2]) < 90000);
   free(r.zero);
   sketch_free(&k);
-  k = sketch_new(2, 1, 1); // s² / (s² + 2ζws + w²) = 1 − (w² + 2ζws) / (…)
+  k = sketch_new(2, 1, 1);  // s² / (s² + 2ζws + w²) = 1 − (w² + 2ζws) / (…)
   add_mode(&k, 500, 0.01, -500 * 500, -2 * 0.01 * 500, NULL, NULL);
   add_mode(&k, 90000, 0.01, -9e4 * 9e4, -2 * 0.01 * 9e4, NULL, NULL);
   k.model.d[0] = 2;
@@ -254,7 +254,7 @@ static void check_two_by_two(double z1, double z2) {
 static void test_square(void **state) {
   (void)state;
   check_two_by_two(245, 400);
-  check_two_by_two(245, 245); // a double zero, as symmetric plants have them
+  check_two_by_two(245, 245);  // a double zero, as symmetric plants have them
 }
 
 static void test_refusals(void **state) {
