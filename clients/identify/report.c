@@ -187,19 +187,12 @@ static void json_agreement(pb_jsonout *j, const char *key, const char *output,
   pb_jsonout_object_end(j);
 }
 
-static void json_root(pb_jsonout *j, const char *key, const pb_pole *p) {
-  pb_jsonout_object(j, key);
-  pb_jsonout_number(j, "hz", p->hz);
-  pb_jsonout_number(j, "damping", p->damping);
-  pb_jsonout_object_end(j);
-}
-
 static void json_modes(pb_jsonout *j, const pb_analysis *a) {
   pb_jsonout_array(j, "modes");
   for (size_t k = 0; k < a->modes; k++) {
     pb_jsonout_object(j, NULL);
-    json_root(j, "exact", &a->mode[k].exact);
-    json_root(j, "measured", &a->mode[k].measured);
+    pb_jsonout_pole(j, "exact", &a->mode[k].exact);
+    pb_jsonout_pole(j, "measured", &a->mode[k].measured);
     pb_jsonout_object_end(j);
   }
   pb_jsonout_array_end(j);
@@ -220,9 +213,9 @@ static void json_channels(pb_jsonout *j, const pb_analysis *a) {
     pb_jsonout_array(j, "zeros");
     for (size_t n = 0; n < row->zeros; n++) {
       pb_jsonout_object(j, NULL);
-      json_root(j, "exact", &row->zero[n].exact.sampled);
-      json_root(j, "continuous", &row->zero[n].exact.continuous);
-      json_root(j, "measured", &row->zero[n].measured);
+      pb_jsonout_pole(j, "exact", &row->zero[n].exact.sampled);
+      pb_jsonout_pole(j, "continuous", &row->zero[n].exact.continuous);
+      pb_jsonout_pole(j, "measured", &row->zero[n].measured);
       pb_jsonout_object_end(j);
     }
     pb_jsonout_array_end(j);

@@ -134,3 +134,10 @@ int pb_sensor_of(const pb_model *model, size_t input) {
   }
   return -1;
 }
+
+void pb_jsonout_pole(pb_jsonout *j, const char *key, const pb_pole *p) {
+  pb_jsonout_object(j, key);
+  pb_jsonout_number(j, "hz", p->hz);
+  pb_jsonout_number(j, "damping", p->damping);
+  pb_jsonout_object_end(j);
+}

@@ -4,6 +4,7 @@
 #define PB_IDENTIFY_ROOTS_H
 
 #include "control/poles.h"
+#include "jsonout.h"
 #include "model/model.h"
 
 // Oscillatory poles (damping < 1) with f1 ≤ |s|/2π ≤ f2, upper half plane, of the sampled model;
@@ -33,5 +34,8 @@ pb_status pb_all_poles(const pb_model *model, pb_pole_list *out, pb_error *err);
 // The force-sensor output that belongs to an actuator's input by name: Va… with Vs…, f… with fm…,
 // the rest of the name equal. −1: none. [any]
 int pb_sensor_of(const pb_model *model, size_t input);
+
+// Writes {"hz", "damping"} under a key; what is not known is null.
+void pb_jsonout_pole(pb_jsonout *j, const char *key, const pb_pole *p);
 
 #endif

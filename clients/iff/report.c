@@ -80,13 +80,6 @@ pb_status iff_print(const iff_result *r, pb_error *err) {
 
 // ---- JSON ---------------------------------------------------------------------------------------
 
-static void json_pole(pb_jsonout *j, const char *key, const pb_pole *p) {
-  pb_jsonout_object(j, key);
-  pb_jsonout_number(j, "hz", p->hz);
-  pb_jsonout_number(j, "damping", p->damping);
-  pb_jsonout_object_end(j);
-}
-
 static void json_controller(pb_jsonout *j, const iff_result *r) {
   pb_jsonout_object(j, "controller");
   pb_jsonout_number(j, "gain", r->law.gain);
@@ -112,10 +105,10 @@ static void json_modes(pb_jsonout *j, const iff_result *r) {
   for (size_t k = 0; k < r->modes; k++) {
     const iff_mode *m = &r->mode[k];
     pb_jsonout_object(j, NULL);
-    json_pole(j, "open_exact", &m->open_exact);
-    json_pole(j, "open_measured", &m->open_measured);
-    json_pole(j, "closed_predicted", &m->closed_predicted);
-    json_pole(j, "closed_measured", &m->closed_measured);
+    pb_jsonout_pole(j, "open_exact", &m->open_exact);
+    pb_jsonout_pole(j, "open_measured", &m->open_measured);
+    pb_jsonout_pole(j, "closed_predicted", &m->closed_predicted);
+    pb_jsonout_pole(j, "closed_measured", &m->closed_measured);
     pb_jsonout_number(j, "damping_error_percent",
                       percent(m->closed_measured.damping, m->closed_predicted.damping));
     pb_jsonout_object_end(j);

@@ -125,18 +125,3 @@ pb_status pb_loader_orientation(const pb_reader *r, double rotation[9], bool *gi
   return pb_fail(r->err, PB_ERR_SCHEMA, where,
                  "z_axis is parallel to the default x_axis [1,0,0]: give an x_axis");
 }
-
-pb_status pb_loader_check_model(pb_loader *loader, const cJSON *model, const char *pointer) {
-  pb_reader r;
-  const char *type;
-  bool component = false, joint = false;
-  pb_status st = pb_reader_open(model, pointer, NULL, &r, loader->err);
-  if (!st) st = pb_reader_string(&r, "type", true, &type);
-  if (!st) st = pb_loader_check_component_model(&r, type, &component);
-  if (!st && !component) st = pb_loader_check_joint_model(&r, type, &joint);
-  if (st || component || joint) return st;
-  char where[256];
-  pb_json_pointer(where, sizeof where, pointer, "type");
-  return pb_fail(loader->err, PB_ERR_SCHEMA, where, "\"%s\" is no type of a component or joint",
-                 type);
-}

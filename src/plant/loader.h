@@ -26,11 +26,8 @@ pb_status pb_loader_damping(const pb_reader *r, pb_super_element *super);
 // *given tells whether there were any; without, the rotation is the identity.
 pb_status pb_loader_orientation(const pb_reader *r, double rotation[9], bool *given);
 
-// Checks a model by itself: its type, its keys, its numbers; keys that are missing may come from
-// the object that names it.
-pb_status pb_loader_check_model(pb_loader *loader, const cJSON *model, const char *pointer);
-
-// The two halves of pb_loader_check_model: *known tells whether `type` is one of theirs.
+// Check a model by itself, as far as its type is one of theirs (*known): its keys and numbers; what
+// is missing may come from the object that names the model.
 pb_status pb_loader_check_component_model(const pb_reader *r, const char *type, bool *known);
 pb_status pb_loader_check_joint_model(const pb_reader *r, const char *type, bool *known);
 

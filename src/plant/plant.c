@@ -150,6 +150,23 @@ static pb_status write_text(const cJSON *file, const char *directory, pb_plant *
   return st;
 }
 
+// Checks a model by itself: its type, its keys, its numbers; keys that are missing may come from
+// the object that names it.
+static pb_status check_model(pb_loader *loader, const cJSON *model, const char *pointer) {
+  pb_reader r;
+  const char *type;
+  bool component = false, joint = false;
+  pb_status st = pb_reader_open(model, pointer, NULL, &r, loader->err);
+  if (!st) st = pb_reader_string(&r, "type", true, &type);
+  if (!st) st = pb_loader_check_component_model(&r, type, &component);
+  if (!st && !component) st = pb_loader_check_joint_model(&r, type, &joint);
+  if (st || component || joint) return st;
+  char where[256];
+  pb_json_pointer(where, sizeof where, pointer, "type");
+  return pb_fail(loader->err, PB_ERR_SCHEMA, where, "\"%s\" is no type of a component or joint",
+                 type);
+}
+
 static pb_status read_plant(pb_loader *loader, const cJSON *file, cJSON **expanded, pb_plant *p) {
   pb_error *err = loader->err;
   pb_status st = read_header(file, p, err);
@@ -157,7 +174,7 @@ static pb_status read_plant(pb_loader *loader, const cJSON *file, cJSON **expand
   for (const cJSON *m = loader->models ? loader->models->child : NULL; m && !st; m = m->next) {
     char pointer[256];
     pb_json_pointer(pointer, sizeof pointer, "/models", m->string);
-    st = pb_loader_check_model(loader, m, pointer);
+    st = check_model(loader, m, pointer);
   }
   if (!st) st = pb_loader_expand(file, expanded, err);
   if (st) return st;
