@@ -92,6 +92,7 @@ static pb_session *session_new(const pb_session_options *options) {
   if (!s) return NULL;
   s->domain = options ? options->domain : 0;
   s->timeout = options && options->timeout > 0.0 ? options->timeout : 5.0;
+  s->history = options ? (int)options->history : 0;
   pthread_condattr_t attr;
   pthread_condattr_init(&attr);
   pthread_condattr_setclock(&attr, CLOCK_MONOTONIC);

@@ -19,7 +19,10 @@ typedef struct pb_session_options {
   uint32_t domain;  // DDS domain id
   const char
       *plant;  // name of the plant; NULL: the only plant of the domain (several: refused, named)
-  double timeout;  // seconds to wait for the daemon; 0: 5 s
+  double timeout;    // seconds to wait for the daemon; 0: 5 s
+  uint32_t history;  // samples kept for a client that is late in real time; 0: the newest only, as
+                     // a controller wants it. A recorder asks for more: it sees them all, in order,
+                     // and answers the newest
 } pb_session_options;
 
 typedef enum pb_run_mode { PB_PAUSED, PB_LOCKSTEP, PB_REALTIME } pb_run_mode;

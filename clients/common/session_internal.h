@@ -21,6 +21,7 @@ typedef struct pb_run {
   bool active;    // samples are to be answered
   bool listener;  // by the listener (lockstep); else by the calling thread
   bool answered;  // at least one sample was
+  bool behind;    // newer samples are at hand: this one needs no answer
   uint64_t first_step, last_step;
   uint32_t epoch;
   int64_t answered_at, progress_at;  // monotonic, ns
@@ -32,6 +33,7 @@ typedef struct pb_run {
 struct pb_session {
   uint32_t domain;
   double timeout;
+  int history;           // samples that the reader keeps; 0: as its topic says
   uint8_t client[16];    // GUID of the participant
   char client_name[64];  // program[pid]
   uint64_t next_request;

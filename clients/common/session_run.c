@@ -72,18 +72,27 @@ static void sample_answer(pb_session *s, const plantbus_Sample *x) {
     run_end(s, PB_OK);
   } else if (!answer_finite(&s->answer)) {
     run_fail(s, PB_ERR_NUMERIC, "the controller's command is not finite");
-  } else {
+  } else if (!run->behind) {
     answer_send(s);
   }
 }
 
+enum { BATCH = 16 };  // samples taken at once
+
+// Of several samples that wait, as a recorder may find them in real time, only the newest is
+// answered.
 static void samples_take(pb_session *s) {
+  plantbus_Sample x[BATCH];
+  void *sample[BATCH];
+  dds_sample_info_t info[BATCH];
+  for (int i = 0; i < BATCH; i++) sample[i] = &x[i];
   while (s->run.active) {
-    plantbus_Sample x;
-    void *sample[1] = {&x};
-    dds_sample_info_t info;
-    if (dds_take(s->sample, sample, &info, 1, 1) != 1) return;
-    if (info.valid_data) sample_answer(s, &x);
+    const dds_return_t count = dds_take(s->sample, sample, info, BATCH, BATCH);
+    if (count <= 0) return;
+    for (dds_return_t i = 0; i < count && s->run.active; i++) {
+      s->run.behind = i + 1 < count;
+      if (info[i].valid_data) sample_answer(s, &x[i]);
+    }
   }
 }
 
@@ -101,8 +110,8 @@ pb_status pb_session_listen(pb_session *s, pb_error *err) {
   dds_listener_t *listener = dds_create_listener(s);
   if (!listener) return pb_fail_memory(err, "listener");
   dds_lset_data_available(listener, on_sample);
-  s->sample =
-      pb_reader_create(s->subscriber, s->topic[PB_TOPIC_SAMPLE], PB_TOPIC_SAMPLE, 0, listener);
+  s->sample = pb_reader_create(s->subscriber, s->topic[PB_TOPIC_SAMPLE], PB_TOPIC_SAMPLE,
+                               s->history, listener);
   dds_delete_listener(listener);
   if (s->sample < 0) return pb_fail(err, PB_ERR_IO, "sample", "%s", dds_strretcode(-s->sample));
   s->sample_wait = dds_create_waitset(s->participant);
