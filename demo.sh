@@ -42,14 +42,17 @@ stop() {
 trap stop EXIT
 trap 'exit 130' INT
 trap 'exit 143' TERM
+trap 'exit 129' HUP
+trap 'exit 141' PIPE
 
 echo
 taskset -c "$cpu" build/bin/plantbusd --plant "$plant" --domain $domain >out/plantbusd.log &
 daemon=$!
-until grep -s ready out/plantbusd.log; do
+until grep -qs ready out/plantbusd.log; do
   kill -0 "$daemon" 2>/dev/null || { daemon=""; echo "demo.sh: the daemon did not start" >&2; exit 1; }
   sleep 0.1
 done
+cat out/plantbusd.log
 echo
 echo "== identification: band-limited noise over the bus, repeated so that nothing leaks"
 input=$(build/bin/plantbus-model info --json "$plant" | sed -n 's/.*"inputs": *\["\([^"]*\)".*/\1/p')
