@@ -18,7 +18,7 @@ static pb_status fail_convergence(const char *context, pb_error *err) {
 }
 
 // LAPACK takes NaN without a word, and eigenvalues that are NaN pair up with nothing.
-static bool all_finite(const double *x, size_t n) {
+bool pb_all_finite(const double *x, size_t n) {
   for (size_t i = 0; i < n; i++)
     if (!isfinite(x[i])) return false;
   return true;
@@ -35,7 +35,7 @@ static pb_status eigenvectors(size_t size, double *a, double *v, double *wr, dou
   if (!work) return pb_fail_memory(err, context);
   dgeev_("N", "V", &n, a, &n, wr, wi, &none, &one, v, &n, work, &lwork, &info);
   free(work);
-  bool ok = info == 0 && all_finite(wr, size) && all_finite(wi, size);
+  bool ok = info == 0 && pb_all_finite(wr, size) && pb_all_finite(wi, size);
   return ok ? PB_OK : fail_convergence(context, err);
 }
 
@@ -196,7 +196,7 @@ done:
 
 pb_status pb_block_diagonalize(size_t n, double *a, double *v, size_t *blocks, size_t *size,
                                const char *context, pb_error *err) {
-  if (!all_finite(a, n * n)) return fail_convergence(context, err);
+  if (!pb_all_finite(a, n * n)) return fail_convergence(context, err);
   bool failed = false;
   double *copy = malloc(n * n * sizeof *copy);
   double *wr = malloc(n * sizeof *wr), *wi = malloc(n * sizeof *wi);

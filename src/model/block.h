@@ -2,6 +2,7 @@
 #ifndef PB_MODEL_BLOCK_H
 #define PB_MODEL_BLOCK_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 #include "base/status.h"
@@ -22,5 +23,8 @@ pb_status pb_block_diagonalize(size_t n, double *a, double *v, size_t *blocks, s
 // [0, 0]] with a [13/13] Padé approximant (Higham, SIAM J. Matrix Anal. Appl. 26, 2005). [init]
 pb_status pb_block_discretize(size_t n, const double *a, double h, double *ad, double *gd,
                               pb_error *err);
+
+// Whether none of n numbers is infinite or NaN. [any]
+bool pb_all_finite(const double *x, size_t n);
 
 #endif

@@ -199,21 +199,15 @@ static pb_status copy_names(const pb_model *from, pb_model *to, pb_error *err) {
   return ok ? PB_OK : pb_fail_memory(err, "");
 }
 
-static bool all_finite(const double *x, size_t n) {
-  for (size_t i = 0; i < n; i++)
-    if (!isfinite(x[i])) return false;
-  return true;
-}
-
 // Numbers that are each fine may still overflow in products.
 static pb_status check_finite(const pb_model *m, pb_error *err) {
   size_t values = m->block_value[m->blocks];
-  if (!all_finite(m->a, values) || !all_finite(m->ad, values))
+  if (!pb_all_finite(m->a, values) || !pb_all_finite(m->ad, values))
     return pb_fail(
         err, PB_ERR_NUMERIC, "/components",
         "masses, stiffnesses and dampings are too far apart: the state matrix overflows");
   for (size_t i = 0; i < m->nu; i++)
-    if (!all_finite(m->b + i * m->nx, m->nx) || !all_finite(m->bd + i * m->nx, m->nx))
+    if (!pb_all_finite(m->b + i * m->nx, m->nx) || !pb_all_finite(m->bd + i * m->nx, m->nx))
       return pb_fail(err, PB_ERR_NUMERIC, "/inputs", "what %s does to the plant overflows",
                      m->input[i].name);
   for (size_t at = 0; at < m->ny * (m->nx + m->nu); at++) {

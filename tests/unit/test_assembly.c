@@ -158,20 +158,21 @@ static void test_redundant_constraints(void **state) {
   pb_plant *p;
   pb_system *s;
   pb_warnings w = {0};
-  REQUIRE(
-      assemble(
-          "\"components\": {" BODY("a", "") ", " BODY("b", "") "}, \"connections\": {" JOINT(
-              "one", "a", "b",
-              "{\"type\": \"weld\"}") ", " JOINT("two", "b", "a",
-                                                 "{\"type\": \"weld\"}") ", " JOINT("z", "ground",
-                                                                                    "a",
-                                                                                    "{\"type\": "
-                                                                                    "\"prismatic\","
-                                                                                    " \"k_a\": "
-                                                                                    "100}") "},"
-                                                                                            " " SIGNALS("b",
-                                                                                                        "[0, 0, 1]"),
-          &p, &s, &w, &err));
+  REQUIRE(assemble(
+      "\"components\": {" BODY("a", "") ", " BODY("b", "") "}, \"connections\": {" JOINT(
+          "one", "a", "b",
+          "{\"type\": \"weld\"}") ", " JOINT("two", "b", "a",
+                                             "{\"type\": \"weld\"}") ", " JOINT("z", "ground", "a",
+                                                                                "{\"type\": "
+                                                                                "\"prismatic\","
+                                                                                " \"k_a\": "
+                                                                                "100}") "},"
+                                                                                        " " SIGNALS(
+                                                                                            "b",
+                                                                                            "[0, "
+                                                                                            "0, "
+                                                                                            "1]"),
+      &p, &s, &w, &err));
   assert_int_equal(s->n, 1);
   assert_int_equal(w.count, 0);
   ASSERT_RELATIVE(s->m[0] / (s->f[0] * s->f[0]), 4, 1e-12);
@@ -204,19 +205,31 @@ static void test_refusals(void **state) {
   refuse("\"components\": {" BODY("a", "") "}, \"connections\": {" JOINT(
              "fixed", "ground", "a", "{\"type\": \"weld\"}") "}, " SIGNALS("a", "[0, 0, 1]"),
          PB_ERR_SINGULAR, "/connections", "no degree of freedom");
-  refuse("\"components\": {" BODY(
-             "a", "") ", \"ghost\": {\"type\": \"rigid_body\", \"mass\": 0, "
-                      "\"inertia\": [0, 0, 0]}}, \"connections\": {" JOINT(
-                          "z", "ground",
-                          "a", "{\"type\": \"prismatic\", \"k_a\": 100}") ", " JOINT("g", "a",
-                                                                                     "ghost",
-                                                                                     "{\"type\": "
-                                                                                     "\"prismatic\""
-                                                                                     "}") "},"
-                                                                                          " " SIGNALS("a",
-                                                                                                      "[0, 0, 1]"),
-         PB_ERR_SINGULAR, "/components/ghost", "without mass and without stiffness");
+  refuse(
+      "\"components\": {" BODY(
+          "a", "") ", \"ghost\": {\"type\": \"rigid_body\", \"mass\": 0, "
+                   "\"inertia\": [0, 0, 0]}}, \"connections\": {" JOINT(
+                       "z", "ground", "a",
+                       "{\"type\": \"prismatic\", \"k_a\": 100}") ", " JOINT("g", "a", "ghost",
+                                                                             "{\"type\": "
+                                                                             "\"prismatic\""
+                                                                             "}") "},"
+                                                                                  " " SIGNALS(
+                                                                                      "a",
+                                                                                      "[0, 0, 1]"),
+      PB_ERR_SINGULAR, "/components/ghost", "without mass and without stiffness");
 }
+
+// Two springs in series with a massless link between them, up to its signals.
+// clang-format off
+#define LINKED_SPRINGS                                                                             \
+  "\"components\": {" BODY("a", "") ", \"link\": {\"type\": \"rigid_body\", \"mass\": 0, "            \
+  "\"inertia\": [0, 0, 0]}}, \"connections\": {"                                                   \
+  JOINT("lower", "ground", "link", "{\"type\": \"prismatic\", \"k_a\": 300}") ", "                 \
+  JOINT("upper", "link", "a", "{\"type\": \"prismatic\", \"k_a\": 600}") "}, "
+#define ALONG_Z(name, type, frame)                                                                 \
+  "{\"name\": \"" name "\", \"type\": \"" type "\", \"frame\": \"" frame "\", \"direction\": [0, 0, 1]}"
+// clang-format on
 
 // Two springs in series with a massless body between them: k/2, and one degree of freedom.
 static void test_massless_is_condensed(void **state) {
@@ -224,68 +237,10 @@ static void test_massless_is_condensed(void **state) {
   pb_plant *p;
   pb_system *s;
   REQUIRE(assemble(
-      "\"components\": {" BODY(
-          "a",
-          "") ", \"link\": {\"type\": \"rigid_body\", "
-              "\"mass\": 0, \"inertia\": [0, 0, 0]}}, \"connections\": {" JOINT(
-                  "lower", "ground", "link",
-                  "{\"type\": \"prismatic\", \"k_a\": 300}") ", " JOINT("upper", "link", "a",
-                                                                        "{\"type\": \"prismatic\", "
-                                                                        "\"k_a\": 600}") "}, "
-                                                                                         "\"inputs"
-                                                                                         "\": "
-                                                                                         "[{"
-                                                                                         "\"name\":"
-                                                                                         " \"F\", "
-                                                                                         "\"type\":"
-                                                                                         " \"force"
-                                                                                         "\", "
-                                                                                         "\"frame\""
-                                                                                         ": \"a\", "
-                                                                                         "\"directi"
-                                                                                         "on\": "
-                                                                                         "[0, 0, "
-                                                                                         "1]}, "
-                                                                                         "{\"name\""
-                                                                                         ": \"L\", "
-                                                                                         "\"type\":"
-                                                                                         " \"force"
-                                                                                         "\", "
-                                                                                         "\"frame\""
-                                                                                         ": "
-                                                                                         "\"link\","
-                                                                                         " \"direct"
-                                                                                         "ion\": "
-                                                                                         "[0, 0, "
-                                                                                         "1]}], "
-                                                                                         "\"outputs"
-                                                                                         "\": "
-                                                                                         "[{"
-                                                                                         "\"name\":"
-                                                                                         " \"x\", "
-                                                                                         "\"type\":"
-                                                                                         " "
-                                                                                         "\"displac"
-                                                                                         "ement\", "
-                                                                                         "\"frame\""
-                                                                                         ": \"a\", "
-                                                                                         "\"directi"
-                                                                                         "on\": "
-                                                                                         "[0, 0, "
-                                                                                         "1]}, "
-                                                                                         "{\"name\""
-                                                                                         ": "
-                                                                                         "\"l\", "
-                                                                                         "\"type\":"
-                                                                                         " \"displa"
-                                                                                         "cement\","
-                                                                                         " \"frame"
-                                                                                         "\": "
-                                                                                         "\"link\","
-                                                                                         " \"direct"
-                                                                                         "ion\": "
-                                                                                         "[0, 0, "
-                                                                                         "1]}]",
+      LINKED_SPRINGS "\"inputs\": [" ALONG_Z("F", "force", "a") ", " ALONG_Z(
+          "L", "force", "link") "], \"outputs\": [" ALONG_Z("x", "displacement",
+                                                            "a") ", " ALONG_Z("l", "displacement",
+                                                                              "link") "]",
       &p, &s, NULL, &err));
   assert_int_equal(s->n, 1);
   ASSERT_RELATIVE(compliance(s, 0, 0), 1 / 200.0, 1e-12);
@@ -300,32 +255,8 @@ static void test_massless_with_many_outputs(void **state) {
   (void)state;
   enum { outputs = 12 };
   char body[4096];
-  int n = snprintf(
-      body, sizeof body,
-      "\"components\": {" BODY(
-          "a",
-          "") ", \"link\": {\"type\": \"rigid_body\", "
-              "\"mass\": 0, \"inertia\": [0, 0, 0]}}, \"connections\": {" JOINT(
-                  "lower", "ground", "link",
-                  "{\"type\": \"prismatic\", \"k_a\": 300}") ", " JOINT("upper", "link", "a",
-                                                                        "{\"type\": \"prismatic\", "
-                                                                        "\"k_a\": 600}") "}, "
-                                                                                         "\"inputs"
-                                                                                         "\": "
-                                                                                         "[{"
-                                                                                         "\"name\":"
-                                                                                         " \"F\", "
-                                                                                         "\"type\":"
-                                                                                         " \"force"
-                                                                                         "\", "
-                                                                                         "\"frame\""
-                                                                                         ": \"a\", "
-                                                                                         "\"directi"
-                                                                                         "on\": "
-                                                                                         "[0, 0, "
-                                                                                         "1]}], "
-                                                                                         "\"outputs"
-                                                                                         "\": [");
+  int n = snprintf(body, sizeof body,
+                   LINKED_SPRINGS "\"inputs\": [" ALONG_Z("F", "force", "a") "], \"outputs\": [");
   for (int i = 0; i < outputs; i++)
     n += snprintf(body + n, sizeof body - (size_t)n,
                   "%s{\"name\": \"y%d\", \"type\": \"displacement\", \"frame\": \"%s\", "
