@@ -34,6 +34,10 @@ static const topic_row table[PB_TOPIC_COUNT] = {
                         4, 0, 5, false, false},
     [PB_TOPIC_EVENT] = {"plantbus/v1/event", &plantbus_Event_desc, DDS_DURABILITY_VOLATILE, 256, 0,
                         5, false, false},
+    [PB_TOPIC_BLOCK_REQUEST] = {"plantbus/v1/block_request", &plantbus_BlockRequest_desc,
+                                DDS_DURABILITY_VOLATILE, 8, 0, 50, false, false},
+    [PB_TOPIC_BLOCK_REPLY] = {"plantbus/v1/block_reply", &plantbus_BlockReply_desc,
+                              DDS_DURABILITY_VOLATILE, 8, 0, 50, false, false},
 };
 
 const char *pb_topic_name(pb_topic topic) {

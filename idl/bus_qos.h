@@ -16,6 +16,8 @@ typedef enum pb_topic {
   PB_TOPIC_REQUEST,
   PB_TOPIC_REPLY,
   PB_TOPIC_EVENT,
+  PB_TOPIC_BLOCK_REQUEST,
+  PB_TOPIC_BLOCK_REPLY,
   PB_TOPIC_COUNT
 } pb_topic;
 
