@@ -54,7 +54,7 @@ static pb_status entities_make(pb_session *s, pb_error *err) {
   s->command =
       pb_writer_create(s->publisher, s->topic[PB_TOPIC_COMMAND], PB_TOPIC_COMMAND, s->guard);
   if (s->command < 0) return pb_fail(err, PB_ERR_IO, "command", "%s", dds_strretcode(-s->command));
-  status = pb_session_match(s, s->command, true, true, deadline, err);
+  status = pb_session_match_daemon(s, s->command, deadline, err);
   return status ? status : pb_session_match(s, s->sample, false, true, deadline, err);
 }
 

@@ -5,6 +5,7 @@
 #include "session_internal.h"
 
 static const int64_t settle_ns = 100000000;  // to hear of other plants, when none is named
+static const int64_t poll_ns = 20000000;     // between looks for the daemon among the partners
 
 static uint32_t partners(dds_entity_t entity, bool writer) {
   dds_publication_matched_status_t p = {0};
@@ -109,5 +110,45 @@ pb_status pb_session_match(pb_session *s, dds_entity_t entity, bool writer, bool
   if (count > 1 && only)
     return pb_fail(err, PB_ERR_STATE, s->received->name, "%u daemons serve a plant of this name",
                    count);
+  return PB_OK;
+}
+
+// Whether one of the writer's readers belongs to the participant that also writes the replies.
+static bool daemon_reads(const pb_session *s, dds_entity_t writer) {
+  enum { MOST = 64 };
+  dds_instance_handle_t peer, list[MOST];
+  if (dds_get_matched_publications(s->reply, &peer, 1) < 1) return false;
+  dds_builtintopic_endpoint_t *daemon = dds_get_matched_publication_data(s->reply, peer);
+  if (!daemon) return false;
+  dds_return_t count = dds_get_matched_subscriptions(writer, list, MOST);
+  bool found = false;
+  for (dds_return_t i = 0; i < count && i < MOST && !found; i++) {
+    dds_builtintopic_endpoint_t *reader = dds_get_matched_subscription_data(writer, list[i]);
+    if (!reader) continue;
+    found = memcmp(&reader->participant_key, &daemon->participant_key,
+                   sizeof daemon->participant_key) == 0;
+    dds_builtintopic_free_endpoint(reader);
+  }
+  dds_builtintopic_free_endpoint(daemon);
+  return found;
+}
+
+// Recorders may read the commands too: more than one reader is no second daemon.
+pb_status pb_session_match_daemon(pb_session *s, dds_entity_t writer, int64_t deadline,
+                                  pb_error *err) {
+  const dds_entity_t waitset = dds_create_waitset(s->participant);
+  dds_set_status_mask(writer, DDS_PUBLICATION_MATCHED_STATUS);
+  dds_waitset_attach(waitset, writer, 0);
+  bool found;
+  while (!(found = daemon_reads(s, writer))) {
+    uint32_t changed;
+    const int64_t now = pb_session_clock();
+    if (now >= deadline) break;
+    dds_waitset_wait(waitset, NULL, 0, deadline - now < poll_ns ? deadline - now : poll_ns);
+    dds_take_status(writer, &changed, DDS_PUBLICATION_MATCHED_STATUS);
+  }
+  dds_delete(waitset);
+  if (!found)
+    return pb_fail(err, PB_ERR_STATE, s->received->name, "the daemon does not answer on the bus");
   return PB_OK;
 }

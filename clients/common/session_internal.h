@@ -68,6 +68,10 @@ pb_status pb_session_find(pb_session *session, const char *plant, pb_error *err)
 pb_status pb_session_match(pb_session *session, dds_entity_t entity, bool writer, bool only,
                            int64_t deadline, pb_error *err);
 
+// Waits until the daemon's reader is among those of a writer.
+pb_status pb_session_match_daemon(pb_session *session, dds_entity_t writer, int64_t deadline,
+                                  pb_error *err);
+
 // session_request.c
 pb_status pb_session_ping(pb_session *session, pb_standing *out, pb_error *err);
 
