@@ -7,3 +7,6 @@ pb_test(client_plot LABELS unit SOURCES test_plot.c LIBS plantbus_client_common)
 
 # Transmission zeros (src/model/zeros).
 pb_test(unit_zeros LABELS unit SOURCES test_zeros.c)
+
+# Recordings (clients/mcap).
+pb_test(client_mcap LABELS unit SOURCES test_mcap.c mcap_parse.c LIBS plantbus_mcap)
