@@ -1,0 +1,372 @@
+// plantbus-record and plantbus-replay with the real daemon: a lockstep run recorded completely,
+// exported and played back; real time without gaps; a reset on the way; ends of every kind.
+#include <matio.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "harness.h"
+#include "recording.h"
+#include "unit/mcap_parse.h"
+
+enum { STEPS = 2000 };
+static char folder[] = "/tmp/pb-record-XXXXXX";
+
+static const char *path_of(const char *name) {
+  static char path[8][256];
+  static int next;
+  char *p = path[next++ % 8];
+  snprintf(p, sizeof path[0], "%s/%s", folder, name);
+  return p;
+}
+
+static int make_folder(void **state) {
+  (void)state;
+  return mkdtemp(folder) ? 0 : -1;
+}
+
+static int remove_folder(void **state) {
+  (void)state;
+  const char *const name[] = {"a.mcap", "a.csv", "a.mat", "plant.json"};
+  for (size_t i = 0; i < sizeof name / sizeof *name; i++) unlink(path_of(name[i]));
+  return rmdir(folder);  // fails when a temporary file was left
+}
+
+// ---- helpers ------------------------------------------------------------------------------------
+
+// A tool on the daemon's domain, with more arguments (NULL-terminated).
+static e2e_child tool(const char *name, const e2e_daemon *daemon, const char *const *more) {
+  char file[256], domain[16];
+  const char *argv[24] = {file, "--domain", domain};
+  snprintf(file, sizeof file, PB_BIN "/%s", name);
+  snprintf(domain, sizeof domain, "%u", daemon->domain);
+  for (int n = 3; *more && n < 23; n++) argv[n] = *more++;
+  return e2e_spawn(argv);
+}
+
+static e2e_child recorder_start(const e2e_daemon *daemon, const char *const *more) {
+  char line[256];
+  e2e_child child = tool("plantbus-record", daemon, more);
+  e2e_expect_line(&child, "recording bus-bench", line);
+  return child;
+}
+
+static double excitation(uint64_t step) {
+  return (double)((step * 7919u) % 1000u) / 333.0 - 1.5;
+}
+
+// What a client saw: samples 0 … STEPS.
+typedef struct witness {
+  uint64_t count, last;
+  double u[STEPS + 1][2], y[STEPS + 1][2];
+} witness;
+
+static bool drive(void *context, const pb_sample *sample, double *command) {
+  witness *w = context;
+  if (sample->step > w->last) return false;
+  assert_int_equal(sample->step, w->count);
+  memcpy(w->u[w->count], sample->input, sizeof w->u[0]);
+  memcpy(w->y[w->count], sample->output, sizeof w->y[0]);
+  w->count++;
+  command[0] = excitation(sample->step);
+  return sample->step < w->last;
+}
+
+static void drive_to(pb_session *session, witness *w, uint64_t last) {
+  const pb_run_options options = {.on_sample = drive, .context = w, .stall = E2E_CAP};
+  pb_error err = {PB_OK, "", ""};
+  w->count = 0;
+  w->last = last;
+  e2e_attach(session, "test", "Va", 0.0);
+  if (pb_session_run(session, &options, NULL, &err)) fail_msg("%s: %s", err.where, err.message);
+  pb_session_detach(session);
+  assert_int_equal(w->count, last + 1);
+}
+
+static pb_recording *open_recording(void) {
+  pb_recording *r = NULL;
+  pb_error err = {PB_OK, "", ""};
+  if (pb_recording_open(path_of("a.mcap"), &r, &err)) fail_msg("%s: %s", err.where, err.message);
+  return r;
+}
+
+// ---- the complete run ---------------------------------------------------------------------------
+
+typedef struct comparison {
+  const witness *witness;
+  uint64_t count;
+} comparison;
+
+static pb_status compare(void *context, const plantbus_Sample *x, pb_error *err) {
+  (void)err;
+  comparison *c = context;
+  assert_int_equal(x->step, c->count);
+  assert_int_equal(x->time_ns, (int64_t)c->count * 100000);
+  assert_int_equal(x->input_count, 2);
+  assert_memory_equal(x->input, c->witness->u[c->count], sizeof c->witness->u[0]);
+  assert_memory_equal(x->output, c->witness->y[c->count], sizeof c->witness->y[0]);
+  c->count++;
+  return PB_OK;
+}
+
+static void check_recording(const witness *w, pb_session *session) {
+  pb_recording *r = open_recording();
+  pb_error err;
+  const pb_description *d = pb_session_description(session);
+  assert_true(r->file.complete);
+  assert_string_equal(r->plant, "bus-bench");
+  assert_int_equal(r->revisions, 1);
+  assert_string_equal(r->revision[0].plant_text, d->plant_text);
+  assert_string_equal(r->revision[0].sha256, d->plant_sha256);
+  assert_string_equal(r->revision[0].software, PB_VERSION);
+  assert_true(r->revision[0].sample_rate == 10000.0);
+  assert_string_equal(r->revision[0].inputs.name[1], "F");
+  assert_string_equal(r->revision[0].outputs.unit[1], "m");
+  assert_int_equal(r->spans.count, 1);
+  assert_int_equal(r->spans.gaps, 0);
+  assert_int_equal(r->spans.samples, STEPS + 1);
+  assert_true(r->events >= 1 && r->statuses >= 1);
+  assert_string_equal(r->event[0].kind, "attached");
+  assert_true(r->commands >= STEPS);
+  comparison c = {w, 0};
+  assert_int_equal(pb_recording_samples(r, compare, &c, &err), PB_OK);
+  assert_int_equal(c.count, STEPS + 1);
+  assert_true(w->y[STEPS][1] != 0.0);  // the plant did move
+  pb_recording_free(r);
+}
+
+static void check_csv(const witness *w) {
+  FILE *stream = fopen(path_of("a.csv"), "r");
+  char line[512];
+  assert_non_null(stream);
+  assert_non_null(fgets(line, sizeof line, stream));
+  assert_string_equal(line, "time [s],step,epoch,revision,flags,Va [V],F [N],Vs [V],y [m]\n");
+  for (uint64_t k = 0; k <= STEPS; k++) {
+    assert_non_null(fgets(line, sizeof line, stream));
+    char *at = line;
+    double cell[9];
+    for (int i = 0; i < 9; i++) cell[i] = strtod(at, &at), at++;
+    assert_true(cell[0] == (double)k / 10000.0 && cell[1] == (double)k);
+    assert_memory_equal(&cell[5], w->u[k], sizeof w->u[0]);
+    assert_memory_equal(&cell[7], w->y[k], sizeof w->y[0]);
+  }
+  assert_null(fgets(line, sizeof line, stream));
+  fclose(stream);
+}
+
+static void check_matrix(mat_t *mat, const char *name, const double *wanted, size_t rows) {
+  matvar_t *v = Mat_VarRead(mat, name);
+  assert_non_null(v);
+  assert_int_equal(v->dims[0], rows);
+  assert_int_equal(v->dims[1], 2);
+  const double *data = v->data;  // column-major; wanted row by row
+  for (size_t k = 0; k < rows; k++)
+    for (size_t i = 0; i < 2; i++)
+      assert_memory_equal(&data[i * rows + k], &wanted[2 * k + i], sizeof *data);
+  Mat_VarFree(v);
+}
+
+static void check_mat(const witness *w) {
+  mat_t *mat = Mat_Open(path_of("a.mat"), MAT_ACC_RDONLY);
+  assert_non_null(mat);
+  check_matrix(mat, "u", w->u[0], STEPS + 1);
+  check_matrix(mat, "y", w->y[0], STEPS + 1);
+  matvar_t *names = Mat_VarRead(mat, "output_names");
+  assert_non_null(names);
+  assert_int_equal(names->dims[0], 2);
+  Mat_VarFree(names);
+  Mat_Close(mat);
+}
+
+static void expect_identical(const e2e_daemon *daemon, const char *command) {
+  char line[256];
+  const char *const more[] = {command, path_of("a.mcap"), "--tolerance", "0", NULL};
+  e2e_child child = tool("plantbus-replay", daemon, more);
+  e2e_expect_line(&child, "2001 samples: identical to the bit", line);
+  assert_int_equal(e2e_reap(&child), 0);
+}
+
+static void a_lockstep_run_is_recorded_and_repeated(void **state) {
+  (void)state;
+  e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, NULL);
+  const char *const more[] = {"-o",       path_of("a.mcap"),
+                              "--csv",    path_of("a.csv"),
+                              "--mat",    path_of("a.mat"),
+                              "--steps",  "2001",
+                              "--topics", "sample,event,status,command",
+                              "--strict", NULL};
+  e2e_child recorder = recorder_start(&daemon, more);
+  pb_session *session = e2e_open(&daemon);
+  witness *w = calloc(1, sizeof *w);
+  assert_non_null(w);
+  drive_to(session, w, STEPS);
+  assert_int_equal(e2e_reap(&recorder), 0);
+  const mcap_parse_counts n = mcap_parse(path_of("a.mcap"));
+  assert_int_equal(n.schemas, 4);
+  assert_int_equal(n.channels, 4);
+  assert_int_equal(n.attachments, 2);
+  assert_int_equal(n.metadata, 2);
+  check_recording(w, session);
+  check_csv(w);
+  check_mat(w);
+  expect_identical(&daemon, "verify");
+  expect_identical(&daemon, "play");
+  free(w);
+  pb_session_close(session);
+  e2e_daemon_end(&daemon);
+}
+
+// The recording of the test before, on a plant that is not the same.
+static void play_refuses_another_plant_file(void **state) {
+  (void)state;
+  FILE *from = fopen(E2E_BENCH, "r"), *to = fopen(path_of("plant.json"), "w");
+  assert_true(from && to);
+  for (int c; (c = fgetc(from)) != EOF;) fputc(c, to);
+  fputc('\n', to);
+  fclose(from);
+  assert_int_equal(fclose(to), 0);
+  e2e_daemon daemon = e2e_daemon_start(path_of("plant.json"), NULL);
+  const char *const more[] = {"play", path_of("a.mcap"), NULL};
+  e2e_child child = tool("plantbus-replay", &daemon, more);
+  assert_int_equal(e2e_reap(&child), 1);
+  e2e_daemon_end(&daemon);
+}
+
+static void export_chooses_and_writes_the_plant_file(void **state) {
+  (void)state;
+  const e2e_daemon nowhere = {.domain = 0};
+  const char *const more[] = {"export",      path_of("a.mcap"),
+                              "--csv",       path_of("a.csv"),
+                              "--from",      "0.01",
+                              "--to",        "0.0102",
+                              "--signals",   "y,Va",
+                              "--plant-out", path_of("plant.json"),
+                              NULL};
+  e2e_child child = tool("plantbus-replay", &nowhere, more);
+  assert_int_equal(e2e_reap(&child), 0);
+  FILE *stream = fopen(path_of("a.csv"), "r");
+  char line[512];
+  assert_non_null(stream);
+  assert_non_null(fgets(line, sizeof line, stream));
+  assert_string_equal(line, "time [s],step,epoch,revision,flags,Va [V],y [m]\n");
+  for (int k = 100; k <= 102; k++) {
+    assert_non_null(fgets(line, sizeof line, stream));
+    assert_int_equal(atoi(strchr(line, ',') + 1), k);
+  }
+  assert_null(fgets(line, sizeof line, stream));
+  fclose(stream);
+  struct stat wrote, original;
+  assert_int_equal(stat(path_of("plant.json"), &wrote), 0);
+  assert_int_equal(stat(E2E_BENCH, &original), 0);
+  assert_int_equal(wrote.st_size, original.st_size);
+}
+
+// ---- resets, real time, ends --------------------------------------------------------------------
+
+static void a_reset_begins_a_second_epoch(void **state) {
+  (void)state;
+  e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, NULL);
+  const char *const more[] = {"-o", path_of("a.mcap"), "--steps", "302", NULL};
+  e2e_child recorder = recorder_start(&daemon, more);
+  pb_session *session = e2e_open(&daemon);
+  witness *w = calloc(1, sizeof *w);
+  assert_non_null(w);
+  drive_to(session, w, 100);
+  e2e_request(session, "reset", NULL);
+  drive_to(session, w, 200);
+  assert_int_equal(e2e_reap(&recorder), 0);
+  pb_recording *r = open_recording();
+  assert_int_equal(r->spans.count, 2);
+  assert_int_equal(r->spans.gaps, 0);
+  assert_int_equal(r->spans.span[0].last_step, 100);
+  assert_int_equal(r->spans.span[1].last_step, 200);
+  assert_int_equal(r->spans.span[1].first_step, 0);
+  assert_true(r->spans.span[1].epoch > r->spans.span[0].epoch);
+  pb_recording_free(r);
+  free(w);
+  pb_session_close(session);
+  e2e_daemon_end(&daemon);
+}
+
+// 10 kHz of plant time at a tenth of its speed.
+static void real_time_has_no_gaps(void **state) {
+  (void)state;
+  const char *const realtime[] = {"--mode", "realtime", "--speed", "0.1", NULL};
+  e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, realtime);
+  const char *const more[] = {"-o", path_of("a.mcap"), "--duration", "0.1", "--strict", NULL};
+  e2e_child recorder = recorder_start(&daemon, more);
+  assert_int_equal(e2e_reap(&recorder), 0);
+  pb_recording *r = open_recording();
+  assert_int_equal(r->spans.samples, 1000);
+  assert_int_equal(r->spans.gaps, 0);
+  assert_int_equal(r->spans.span[0].last_step - r->spans.span[0].first_step, 999);
+  assert_true(r->log_last > r->log_first);
+  pb_recording_free(r);
+  e2e_daemon_end(&daemon);
+}
+
+static bool file_has_grown(void *context) {
+  (void)context;
+  struct stat info;
+  return stat(path_of("a.mcap"), &info) == 0 && info.st_size > 1200000;  // a whole chunk at least
+}
+
+// SIGINT ends the file in order; SIGKILL leaves what was flushed.
+static void end_by_signal(int number, int status, bool complete) {
+  const char *const realtime[] = {"--mode", "realtime", "--speed", "0.1", NULL};
+  e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, realtime);
+  const char *const more[] = {"-o", path_of("a.mcap"), NULL};
+  unlink(path_of("a.mcap"));
+  e2e_child recorder = recorder_start(&daemon, more);
+  e2e_until(file_has_grown, NULL, "samples in the file");
+  assert_int_equal(kill(recorder.pid, number), 0);
+  assert_int_equal(e2e_reap(&recorder), status);
+  pb_recording *r = open_recording();
+  assert_int_equal(r->file.complete, complete);
+  assert_non_null(r->revision[0].plant_text);
+  assert_true(r->spans.samples > 0);
+  if (complete) mcap_parse(path_of("a.mcap"));
+  pb_recording_free(r);
+  e2e_daemon_end(&daemon);
+}
+
+static void an_interrupted_recording_is_complete(void **state) {
+  (void)state;
+  end_by_signal(SIGINT, 0, true);
+}
+
+static void a_killed_recorder_leaves_a_readable_file(void **state) {
+  (void)state;
+  end_by_signal(SIGKILL, -SIGKILL, false);
+}
+
+static void the_end_of_the_daemon_ends_the_recording(void **state) {
+  (void)state;
+  for (int limited = 0; limited < 2; limited++) {
+    e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, NULL);
+    const char *const more[] = {"-o", path_of("a.mcap"), limited ? "--steps" : NULL, "100", NULL};
+    e2e_child recorder = recorder_start(&daemon, more);
+    e2e_daemon_end(&daemon);
+    assert_int_equal(e2e_reap(&recorder), limited);  // it did not get what it was to record
+    pb_recording *r = open_recording();
+    assert_true(r->file.complete);
+    pb_recording_free(r);
+  }
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(a_lockstep_run_is_recorded_and_repeated),
+      cmocka_unit_test(play_refuses_another_plant_file),
+      cmocka_unit_test(export_chooses_and_writes_the_plant_file),
+      cmocka_unit_test(a_reset_begins_a_second_epoch),
+      cmocka_unit_test(real_time_has_no_gaps),
+      cmocka_unit_test(an_interrupted_recording_is_complete),
+      cmocka_unit_test(a_killed_recorder_leaves_a_readable_file),
+      cmocka_unit_test(the_end_of_the_daemon_ends_the_recording),
+  };
+  return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
