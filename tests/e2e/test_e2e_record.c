@@ -291,6 +291,47 @@ static void a_reset_begins_a_second_epoch(void **state) {
   e2e_daemon_end(&daemon);
 }
 
+// A second writer plays a daemon whose model was changed.
+static void a_changed_description_is_a_second_revision(void **state) {
+  (void)state;
+  e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, NULL);
+  const char *const more[] = {"-o", path_of("a.mcap"), NULL};
+  e2e_child recorder = recorder_start(&daemon, more);
+  e2e_raw raw = e2e_raw_join(&daemon);
+  const dds_entity_t writer = e2e_raw_writer(&raw, PB_TOPIC_DESCRIPTION);
+  char *in[] = {"Va"}, *volt[] = {"V"}, *out[] = {"y", "v"}, *unit[] = {"m", "m/s"};
+  double model[] = {1.0, 2.0, 3.0};
+  const plantbus_PlantDescription d = {.name = "bus-bench",
+                                       .revision = 2,
+                                       .sample_rate = 5000,
+                                       .input_names = {1, 1, in, false},
+                                       .input_units = {1, 1, volt, false},
+                                       .output_names = {2, 2, out, false},
+                                       .output_units = {2, 2, unit, false},
+                                       .plant_text = "{\"second\": true}",
+                                       .plant_sha256 = "02",
+                                       .software_version = "later",
+                                       .model = {3, 3, model, false}};
+  for (int i = 0; i < 2; i++) {  // told again: not recorded again
+    assert_int_equal(dds_write(writer, &d), DDS_RETCODE_OK);
+    assert_int_equal(dds_wait_for_acks(writer, DDS_SECS(5)), DDS_RETCODE_OK);
+  }
+  assert_int_equal(kill(recorder.pid, SIGINT), 0);
+  assert_int_equal(e2e_reap(&recorder), 0);
+  pb_recording *r = open_recording();
+  assert_int_equal(r->revisions, 2);
+  assert_string_equal(r->revision[0].attachment, "plant.json");
+  assert_string_equal(r->revision[1].attachment, "plant-r2.json");
+  assert_string_equal(r->revision[1].plant_text, d.plant_text);
+  assert_string_equal(r->revision[1].outputs.name[1], "v");
+  assert_string_equal(r->revision[1].outputs.unit[1], "m/s");
+  assert_int_equal(r->revision[1].packed_count, 3);
+  assert_memory_equal(r->revision[1].packed, model, sizeof model);
+  pb_recording_free(r);
+  dds_delete(raw.participant);
+  e2e_daemon_end(&daemon);
+}
+
 // 10 kHz of plant time at a tenth of its speed.
 static void real_time_has_no_gaps(void **state) {
   (void)state;
@@ -363,6 +404,7 @@ int main(void) {
       cmocka_unit_test(play_refuses_another_plant_file),
       cmocka_unit_test(export_chooses_and_writes_the_plant_file),
       cmocka_unit_test(a_reset_begins_a_second_epoch),
+      cmocka_unit_test(a_changed_description_is_a_second_revision),
       cmocka_unit_test(real_time_has_no_gaps),
       cmocka_unit_test(an_interrupted_recording_is_complete),
       cmocka_unit_test(a_killed_recorder_leaves_a_readable_file),

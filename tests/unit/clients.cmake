@@ -10,3 +10,4 @@ pb_test(unit_zeros LABELS unit SOURCES test_zeros.c)
 
 # Recordings (clients/mcap).
 pb_test(client_mcap LABELS unit SOURCES test_mcap.c mcap_parse.c LIBS plantbus_mcap)
+pb_test(client_recording LABELS unit SOURCES test_recording.c LIBS plantbus_mcap)
