@@ -13,6 +13,7 @@
 #include "unit/mcap_parse.h"
 
 enum { STEPS = 2000 };
+static double last_output;  // of the run that is recorded first
 static char folder[] = "/tmp/pb-record-XXXXXX";
 
 static const char *path_of(const char *name) {
@@ -212,6 +213,7 @@ static void a_lockstep_run_is_recorded_and_repeated(void **state) {
   check_recording(w, session);
   check_csv(w);
   check_mat(w);
+  last_output = w->y[STEPS][1];
   expect_identical(&daemon, "verify");
   expect_identical(&daemon, "play");
   free(w);
@@ -219,7 +221,47 @@ static void a_lockstep_run_is_recorded_and_repeated(void **state) {
   e2e_daemon_end(&daemon);
 }
 
-// The recording of the test before, on a plant that is not the same.
+// Turns a bit of the last output in the file and gives up the CRCs that cover it (0: not checked).
+static void falsify(const char *path, double value) {
+  FILE *stream = fopen(path, "r+b");
+  assert_non_null(stream);
+  static uint8_t content[8 << 20];
+  const size_t size = fread(content, 1, sizeof content, stream);
+  uint8_t *found = NULL;
+  for (size_t at = 8; at + 9 < size;) {
+    uint64_t length;
+    memcpy(&length, content + at + 1, 8);
+    uint8_t *inside = content + at + 9;
+    if (content[at] == 6) memset(inside + 24, 0, 4);  // chunk
+    if (content[at] == 15) memset(inside, 0, 4);      // end of the data section
+    uint8_t *hit = content[at] == 6 ? memmem(inside, length, &value, sizeof value) : NULL;
+    found = hit ? hit : found;
+    at += 9 + length;
+    if (content[at - 9 - length] == 15) break;
+  }
+  assert_non_null(found);
+  found[0] ^= 1;
+  rewind(stream);
+  assert_int_equal(fwrite(content, 1, size, stream), size);
+  assert_int_equal(fclose(stream), 0);
+}
+
+// The recording of the first test, with one bit of one output turned.
+static void a_deviation_of_one_bit_is_told(void **state) {
+  (void)state;
+  const e2e_daemon nowhere = {.domain = 0};
+  const char *const judged[] = {"verify", path_of("a.mcap"), "--tolerance", "0", NULL};
+  const char *const told[] = {"verify", path_of("a.mcap"), NULL};
+  char line[256];
+  falsify(path_of("a.mcap"), last_output);
+  e2e_child child = tool("plantbus-replay", &nowhere, told);
+  e2e_expect_line(&child, "1 of 2001 samples differ", line);
+  assert_int_equal(e2e_reap(&child), 0);
+  child = tool("plantbus-replay", &nowhere, judged);
+  assert_int_equal(e2e_reap(&child), 1);
+}
+
+// The recording of the first test, on a plant that is not the same.
 static void play_refuses_another_plant_file(void **state) {
   (void)state;
   FILE *from = fopen(E2E_BENCH, "r"), *to = fopen(path_of("plant.json"), "w");
@@ -403,6 +445,7 @@ int main(void) {
       cmocka_unit_test(a_lockstep_run_is_recorded_and_repeated),
       cmocka_unit_test(play_refuses_another_plant_file),
       cmocka_unit_test(export_chooses_and_writes_the_plant_file),
+      cmocka_unit_test(a_deviation_of_one_bit_is_told),
       cmocka_unit_test(a_reset_begins_a_second_epoch),
       cmocka_unit_test(a_changed_description_is_a_second_revision),
       cmocka_unit_test(real_time_has_no_gaps),
