@@ -55,6 +55,35 @@ const pb_description *pb_session_description(const pb_session *session);
 pb_status pb_session_request(pb_session *session, const char *kind, const char *body,
                              double timeout, char **result, pb_error *err);
 
+// The daemon's answer to a request. Zero-initialise; free with pb_answer_clear.
+typedef struct pb_answer {
+  bool accepted;   // the work goes on, an event tells the end; else it is done
+  uint64_t event;  // number of the first event that can tell it: for pb_session_wait_event
+  char *result;    // a JSON object as text
+} pb_answer;
+
+// As pb_session_request, and tells whether the work is done or goes on. Pings first, so that an
+// event of an earlier request cannot be taken for this one's. [init]
+pb_status pb_session_ask(pb_session *session, const char *kind, const char *body, double timeout,
+                         pb_answer *out, pb_error *err);
+void pb_answer_clear(pb_answer *answer);
+
+typedef struct pb_session_event {
+  uint64_t number;
+  uint32_t epoch;
+  uint64_t step;
+  char kind[32], client_name[64], channel[64];
+  char message[512];
+} pb_session_event;
+
+// Waits for an event of one of these kinds (words, separated by blanks) with this number or a later
+// one that concerns this client or none, and copies it. Events that come before it are thrown away.
+// timeout 0: the session's. Fails with PB_ERR_STATE:
+// none came in time, the daemon has gone, `interrupted` (may be NULL) became true. [init]
+pb_status pb_session_wait_event(pb_session *session, const char *kinds, uint64_t first,
+                                double timeout, bool (*interrupted)(void), pb_session_event *out,
+                                pb_error *err);
+
 typedef struct pb_attach_options {
   const char *channel;        // name; channels add up on an input
   const char *const *inputs;  // names of the wanted inputs, in the order of the commands

@@ -24,9 +24,10 @@ static bool reply_take(pb_session *s, uint64_t id, plantbus_Reply **reply) {
   }
 }
 
-static pb_status reply_read(const plantbus_Reply *reply, const char *kind, char **result,
-                            pb_error *err) {
-  if (strcmp(reply->status, "ok") != 0 && strcmp(reply->status, "accepted") != 0)
+static pb_status reply_read(const plantbus_Reply *reply, const char *kind, bool *accepted,
+                            char **result, pb_error *err) {
+  *accepted = strcmp(reply->status, "accepted") == 0;
+  if (strcmp(reply->status, "ok") != 0 && !*accepted)
     return pb_fail(err, PB_ERR_STATE, reply->pointer, "%s refused: %s", kind, reply->message);
   if (!result) return PB_OK;
   *result = pb_text_copy(reply->result);
@@ -49,8 +50,8 @@ static bool reply_wait(pb_session *s, const plantbus_Request *request, int64_t d
   }
 }
 
-pb_status pb_session_request(pb_session *s, const char *kind, const char *body, double timeout,
-                             char **result, pb_error *err) {
+static pb_status ask(pb_session *s, const char *kind, const char *body, double timeout,
+                     bool *accepted, char **result, pb_error *err) {
   if (result) *result = NULL;
   if (timeout <= 0.0) timeout = s->timeout;
   plantbus_Request request = {
@@ -60,10 +61,31 @@ pb_status pb_session_request(pb_session *s, const char *kind, const char *body, 
   if (!reply_wait(s, &request, pb_session_clock() + (int64_t)(timeout * 1e9), &reply))
     return pb_fail(err, PB_ERR_STATE, kind, "plant '%s' did not answer within %g s",
                    s->received->name, timeout);
-  const pb_status status = reply_read(reply, kind, result, err);
+  const pb_status status = reply_read(reply, kind, accepted, result, err);
   void *sample[1] = {reply};
   dds_return_loan(s->reply, sample, 1);
   return status;
+}
+
+pb_status pb_session_request(pb_session *s, const char *kind, const char *body, double timeout,
+                             char **result, pb_error *err) {
+  bool accepted;
+  return ask(s, kind, body, timeout, &accepted, result, err);
+}
+
+pb_status pb_session_ask(pb_session *s, const char *kind, const char *body, double timeout,
+                         pb_answer *out, pb_error *err) {
+  pb_standing standing = {0};
+  *out = (pb_answer){0};
+  pb_status status = pb_session_ping(s, &standing, err);
+  if (!status) status = ask(s, kind, body, timeout, &out->accepted, &out->result, err);
+  if (!status) out->event = standing.event;
+  return status;
+}
+
+void pb_answer_clear(pb_answer *answer) {
+  free(answer->result);
+  *answer = (pb_answer){0};
 }
 
 double pb_session_result(const char *result, const char *key) {
