@@ -54,8 +54,8 @@ static void types_compare(dds_builtintopic_endpoint_t *e, dds_entity_t topic, pb
   dds_typeinfo_t *ours = NULL;
   if (dds_builtintopic_get_endpoint_type_info(e, &theirs) != DDS_RETCODE_OK || !theirs) return;
   if (dds_get_typeinfo(topic, &ours) != DDS_RETCODE_OK || !ours) return;
-  ddsi_typeid_t *a = ddsi_typeinfo_typeid(theirs, DDSI_TYPEID_KIND_COMPLETE);
-  ddsi_typeid_t *b = ddsi_typeinfo_typeid(ours, DDSI_TYPEID_KIND_COMPLETE);
+  ddsi_typeid_t *a = ddsi_typeinfo_typeid(theirs, DDSI_TYPEID_KIND_MINIMAL);
+  ddsi_typeid_t *b = ddsi_typeinfo_typeid(ours, DDSI_TYPEID_KIND_MINIMAL);
   out->has_type_info = a && b && !ddsi_typeid_is_none(a) && !ddsi_typeid_is_none(b);
   out->same_type = out->has_type_info && ddsi_typeid_compare(a, b) == 0;
   if (a) ddsi_typeid_fini(a);
@@ -89,8 +89,7 @@ typedef struct collector {
 } collector;
 
 static bool take_one(const collector *c, dds_entity_t pseudo_topic, void *sample) {
-  if (pseudo_topic == DDS_BUILTIN_TOPIC_DCPSPARTICIPANT)
-    return peer_add(c->out, sample, &c->own);
+  if (pseudo_topic == DDS_BUILTIN_TOPIC_DCPSPARTICIPANT) return peer_add(c->out, sample, &c->own);
   dds_builtintopic_endpoint_t *e = sample;
   if (strncmp(e->topic_name, "plantbus/", 9) != 0) return true;
   if (memcmp(&e->participant_key, &c->own, sizeof c->own) == 0) return true;
@@ -148,6 +147,6 @@ void pb_peer_format(const pb_peer *peer, char *text, size_t size) {
     return;
   }
   snprintf(text, size, "%s%s%s%s%s%s", peer->process[0] ? peer->process : "a process",
-           peer->pid[0] ? "[" : "", peer->pid, peer->pid[0] ? "]" : "",
-           peer->host[0] ? " on " : "", peer->host);
+           peer->pid[0] ? "[" : "", peer->pid, peer->pid[0] ? "]" : "", peer->host[0] ? " on " : "",
+           peer->host);
 }

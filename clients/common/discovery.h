@@ -21,9 +21,9 @@ typedef struct pb_endpoint {
   dds_guid_t participant;
   bool writer;
   char topic[128], type[128];
-  char partition[160];  // joined by commas; empty: the default one
-  dds_qos_t *qos;       // owned
-  bool has_type_info, same_type;  // same_type: its type is exactly the one this program was built with
+  char partition[160];            // joined by commas; empty: the default one
+  dds_qos_t *qos;                 // owned
+  bool has_type_info, same_type;  // same_type: as this program was built with
 } pb_endpoint;
 
 // Zero-initialise; free with pb_discovery_clear.

@@ -90,8 +90,7 @@ pb_status pb_plants_find(dds_entity_t participant, dds_entity_t description_topi
   pb_status status = PB_OK;
   if (dds_waitset_attach(waitset, condition, 0) < 0)
     status = pb_fail(err, PB_ERR_IO, "DDS", "the descriptions cannot be read");
-  if (!status)
-    status = wait_all(out, reader, waitset, plant, timeout, interrupted, err);
+  if (!status) status = wait_all(out, reader, waitset, plant, timeout, interrupted, err);
   if (waitset > 0) dds_delete(waitset);
   if (subscriber > 0) dds_delete(subscriber);
   if (status) pb_plants_clear(out);

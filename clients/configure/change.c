@@ -17,8 +17,7 @@ static pb_status check_text(const configure_options *o, const char *text, pb_err
   pb_warnings warnings = {0};
   pb_plant *plant = NULL;
   pb_error inner = {0};
-  pb_status status =
-      pb_plant_parse(text, strlen(text), o->directory, &warnings, &plant, &inner);
+  pb_status status = pb_plant_parse(text, strlen(text), o->directory, &warnings, &plant, &inner);
   pb_plant_free(plant);
   pb_print_warnings(stderr, &warnings);
   pb_warnings_clear(&warnings);
@@ -60,7 +59,8 @@ static pb_status fill_up(cJSON *to, const cJSON *from, pb_error *err) {
 static void print_number(const cJSON *result, const char *key, const char *label,
                          const char *unit) {
   const cJSON *item = pb_json_member(result, key);
-  if (cJSON_IsNumber(item)) printf("%-16s %.6g%s%s\n", label, item->valuedouble, unit[0] ? " " : "", unit);
+  if (cJSON_IsNumber(item))
+    printf("%-16s %.6g%s%s\n", label, item->valuedouble, unit[0] ? " " : "", unit);
 }
 
 static void print_result(const cJSON *result) {
@@ -81,8 +81,8 @@ static void print_result(const cJSON *result) {
 }
 
 // The event's word, and from the history what the reply could not know yet.
-static pb_status swap_wait(const configure_options *o, pb_session *session,
-                           const pb_answer *answer, cJSON *result, pb_error *err) {
+static pb_status swap_wait(const configure_options *o, pb_session *session, const pb_answer *answer,
+                           cJSON *result, pb_error *err) {
   pb_session_event event;
   cJSON *entry = NULL;
   const cJSON *revision = pb_json_member(result, "revision");

@@ -138,16 +138,20 @@ static pb_status run_command(const configure_options *o, pb_session *session, pb
 int main(int argc, char **argv) {
   static const struct argp_child children[] = {{&pb_common_argp, 0, NULL, 0}, {0}};
   static const struct argp argp = {
-      option_table, parse, "get [POINTER]\nset POINTER VALUE\npatch FILE|-\nhistory\nrevert REVISION",
-      description,  children, NULL, NULL};
+      option_table,
+      parse,
+      "get [POINTER]\nset POINTER VALUE\npatch FILE|-\nhistory\nrevert REVISION",
+      description,
+      children,
+      NULL,
+      NULL};
   configure_options options = {.wait = 60.0};
   pb_session *session = NULL;
   pb_error err = {0};
   pb_options_parse(&argp, argc, argv, &options);
   pb_interrupt_install();
-  const pb_session_options session_options = {.domain = options.common.domain,
-                                              .plant = options.common.plant,
-                                              .timeout = options.timeout};
+  const pb_session_options session_options = {
+      .domain = options.common.domain, .plant = options.common.plant, .timeout = options.timeout};
   pb_status status = pb_session_open(&session_options, &session, &err);
   if (!status) status = run_command(&options, session, &err);
   pb_session_close(session);

@@ -18,7 +18,8 @@ static pb_status token_next(const char **at, const char *pointer, char out[TOKEN
     char c = *p;
     if (c == '~') {
       if (p[1] != '0' && p[1] != '1')
-        return pb_fail(err, PB_ERR_ARGUMENT, pointer, "~ must be written ~0, and / inside a key ~1");
+        return pb_fail(err, PB_ERR_ARGUMENT, pointer,
+                       "~ must be written ~0, and / inside a key ~1");
       c = *++p == '0' ? '~' : '/';
     }
     if (n + 1 >= TOKEN) return pb_fail(err, PB_ERR_ARGUMENT, pointer, "a key is too long");
@@ -83,8 +84,7 @@ static pb_status members_make(const cJSON *old, const cJSON *value, const char *
   pb_status status = PB_OK;
   if (cJSON_IsObject(old))
     for (const cJSON *m = old->child; m && !status; m = m->next)
-      if (!pb_json_member(value, m->string))
-        status = add(out, m->string, cJSON_CreateNull(), err);
+      if (!pb_json_member(value, m->string)) status = add(out, m->string, cJSON_CreateNull(), err);
   for (const cJSON *m = value->child; m && !status; m = m->next) {
     char place[256];
     cJSON *part = NULL;

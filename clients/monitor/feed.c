@@ -75,8 +75,8 @@ static dds_entity_t sample_reader(feed *f, dds_entity_t subscriber) {
 
 static pb_status readers_make(feed *f, pb_error *err) {
   const dds_entity_t subscriber = pb_partition_create(f->participant, f->described->name, false);
-  f->description = pb_reader_create(subscriber, f->topic[PB_TOPIC_DESCRIPTION],
-                                    PB_TOPIC_DESCRIPTION, 0, NULL);
+  f->description =
+      pb_reader_create(subscriber, f->topic[PB_TOPIC_DESCRIPTION], PB_TOPIC_DESCRIPTION, 0, NULL);
   f->status = pb_reader_create(subscriber, f->topic[PB_TOPIC_STATUS], PB_TOPIC_STATUS, 0, NULL);
   f->event = pb_reader_create(subscriber, f->topic[PB_TOPIC_EVENT], PB_TOPIC_EVENT, 0, NULL);
   f->sample = sample_reader(f, subscriber);
@@ -175,8 +175,7 @@ static void sample_take(feed *f) {
   if (m->has_sample && x->revision != revision) extremes_forget(f);
   m->has_sample = true;
   for (uint32_t i = 0; i < x->input_count; i++) extreme(m, i, x->input[i]);
-  for (uint32_t i = 0; i < x->output_count; i++)
-    extreme(m, plantbus_MAX_INPUTS + i, x->output[i]);
+  for (uint32_t i = 0; i < x->output_count; i++) extreme(m, plantbus_MAX_INPUTS + i, x->output[i]);
   m->seen++;
 }
 

@@ -30,7 +30,8 @@ static const char description[] =
     "On a terminal the view is redrawn until q or Ctrl-C; in a pipe it is a line a status. The "
     "monitor only listens: no client and no step waits for it. The least and the most of a signal "
     "are those of the samples that it looked at.\n\n"
-    "Exit codes: 0 done, 1 no plant, several plants or the daemon has gone, 2 wrong command line.\n";
+    "Exit codes: 0 done, 1 no plant, several plants or the daemon has gone, 2 wrong command "
+    "line.\n";
 
 static error_t parse(int key, char *text, struct argp_state *state) {
   monitor_options *o = state->input;

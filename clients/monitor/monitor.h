@@ -25,10 +25,10 @@ typedef struct monitor_state {
   char daemon[200];                    // "process[pid] on host"
   bool gone;                           // the daemon is
   bool has_sample;
-  plantbus_Sample sample;                                  // the newest
-  double least[MONITOR_SIGNALS], most[MONITOR_SIGNALS];    // inputs, then outputs: of those seen
-  uint64_t seen;                                           // samples seen, of this revision
-  monitor_event event[MONITOR_EVENTS];                     // the newest last
+  plantbus_Sample sample;                                // the newest
+  double least[MONITOR_SIGNALS], most[MONITOR_SIGNALS];  // inputs, then outputs: of those seen
+  uint64_t seen;                                         // samples seen, of this revision
+  monitor_event event[MONITOR_EVENTS];                   // the newest last
   size_t events;
 } monitor_state;
 

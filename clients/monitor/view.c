@@ -83,8 +83,8 @@ static void waits(const plantbus_PlantStatus *p, screen *s) {
 }
 
 static void view_members(const plantbus_PlantStatus *p, screen *s) {
-  static const char *const head[] = {"client", "channel", "prio", "acts", "bar.",
-                                     "commands", "late", "age", "oldest"};
+  static const char *const head[] = {"client",   "channel", "prio", "acts",  "bar.",
+                                     "commands", "late",    "age",  "oldest"};
   screen_line(s);
   if (p->attached._length == 0) {
     screen_put(s, SCREEN_DIM, "nobody is attached");

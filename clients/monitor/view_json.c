@@ -1,5 +1,5 @@
-// A plant's state as JSON. What does not fit a double, or is not a number to reckon with (the hash),
-// is a hexadecimal text.
+// A plant's state as JSON. What does not fit a double, or is not a number to reckon with (the
+// hash), is a hexadecimal text.
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -94,8 +94,8 @@ static bool status_add(cJSON *root, const monitor_state *m) {
          number(root, "decimation", p->decimation) && number(root, "epoch", p->epoch) &&
          number(root, "revision", p->revision) && number(root, "step", (double)p->step) &&
          number(root, "steps_per_second", p->steps_per_second) &&
-         number(root, "nominal_steps_per_second", monitor_nominal(m)) &&
-         text(root, "hash", hash) && number(root, "hash_step", (double)p->hash_step) &&
+         number(root, "nominal_steps_per_second", monitor_nominal(m)) && text(root, "hash", hash) &&
+         number(root, "hash_step", (double)p->hash_step) &&
          flag(root, "configuring", p->configuring) && members(root, p) && hosted(root, p) &&
          refused(root, &p->refused) && number(root, "late", (double)p->late) &&
          number(root, "overruns", (double)p->overruns) &&

@@ -141,8 +141,8 @@ static pb_status run(const request_options *o, pb_error *err) {
 
 int main(int argc, char **argv) {
   static const struct argp_child children[] = {{&pb_common_argp, 0, NULL, 0}, {0}};
-  static const struct argp argp = {option_table, parse, "KIND [JSON|@FILE|-]", description,
-                                   children,     NULL,  NULL};
+  static const struct argp argp = {
+      option_table, parse, "KIND [JSON|@FILE|-]", description, children, NULL, NULL};
   request_options options = {0};
   pb_error err = {0};
   pb_options_parse(&argp, argc, argv, &options);
