@@ -135,6 +135,17 @@ static pb_status run_command(const configure_options *o, pb_session *session, pb
   return status;
 }
 
+// A negative number is a value, not options: a blank before it, which JSON allows, tells argp so.
+// The copies live as long as the process.
+static void protect_numbers(int argc, char **argv) {
+  for (int i = 1; i < argc; i++) {
+    double value;
+    char *copy;
+    if (argv[i][0] != '-' || !pb_parse_double(argv[i], &value)) continue;
+    if (asprintf(&copy, " %s", argv[i]) > 0) argv[i] = copy;
+  }
+}
+
 int main(int argc, char **argv) {
   static const struct argp_child children[] = {{&pb_common_argp, 0, NULL, 0}, {0}};
   static const struct argp argp = {
@@ -148,6 +159,7 @@ int main(int argc, char **argv) {
   configure_options options = {.wait = 60.0};
   pb_session *session = NULL;
   pb_error err = {0};
+  protect_numbers(argc, argv);
   pb_options_parse(&argp, argc, argv, &options);
   pb_interrupt_install();
   const pb_session_options session_options = {

@@ -11,3 +11,7 @@ pb_test(unit_zeros LABELS unit SOURCES test_zeros.c)
 # Recordings (clients/mcap).
 pb_test(client_mcap LABELS unit SOURCES test_mcap.c mcap_parse.c LIBS plantbus_mcap)
 pb_test(client_recording LABELS unit SOURCES test_recording.c LIBS plantbus_mcap)
+
+pb_test(client_patch LABELS unit SOURCES test_patch.c LIBS plantbus_patch)
+pb_test(client_monitor_view LABELS unit SOURCES test_monitor_view.c LIBS plantbus_monitor_view cjson)
+pb_test(client_doctor_checks LABELS unit SOURCES test_doctor_checks.c LIBS plantbus_doctor_checks)
