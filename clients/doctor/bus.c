@@ -124,6 +124,11 @@ void doctor_plants(doctor *d) {
   plant_names(d, text, sizeof text);
   if (d->plants.count == 0 && doctor_others(d) == 0)
     report_add(&d->report, GRADE_FAIL, "plant", NULL, "no plant, as nobody is there");
+  else if (d->plants.count == 0 && d->seen.endpoints == 0)
+    report_add(&d->report, GRADE_FAIL, "plant",
+               "use the same interface and configuration on both sides; else unicast is held up by "
+               "a firewall",
+               "there are participants, but no reader or writer of the bus was heard of");
   else if (d->plants.count == 0)
     report_add(&d->report, GRADE_FAIL, "plant",
                "start plantbusd; if it runs, see qos and types below, and the firewall",
