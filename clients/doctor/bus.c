@@ -22,9 +22,7 @@ bool doctor_join(doctor *d) {
           pb_fail(&err, PB_ERR_IO, pb_topic_name((pb_topic)t), "%s", dds_strretcode(-d->topic[t]));
   }
   if (status)
-    report_add(&d->report, GRADE_FAIL, "domain",
-               "mend what is said above and by the middleware on stderr; with participant indices, "
-               "see ports",
+    report_add(&d->report, GRADE_FAIL, "domain", "mend what the middleware says on stderr",
                "%s: %s", err.where, err.message);
   else
     report_add(&d->report, GRADE_OK, "domain", NULL, "domain %u is joined", o->common.domain);

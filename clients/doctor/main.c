@@ -74,8 +74,9 @@ static error_t parse(int key, char *text, struct argp_state *state) {
 static void examine(doctor *d) {
   if (!doctor_configuration(d)) return;
   doctor_interfaces(d);
-  if (report_worst(&d->report) == GRADE_FAIL) return;  // the domain would not be the one meant
   doctor_ports(d);
+  // With these the domain cannot be joined, or would not be the one meant.
+  if (report_worst(&d->report) == GRADE_FAIL) return;
   if (!doctor_join(d)) return;
   doctor_discover(d);
   doctor_participants(d);
@@ -102,6 +103,8 @@ int main(int argc, char **argv) {
     status = options.json ? report_print_json(&d.report, stdout, &err)
                           : report_print(&d.report, stdout, &err);
   }
+  if (!status && (fflush(stdout) != 0 || ferror(stdout)))
+    status = pb_fail(&err, PB_ERR_IO, "output", "cannot be written");
   const bool failed = status || report_worst(&d.report) == GRADE_FAIL;
   if (status) pb_print_error(stderr, &err);
   pb_plants_clear(&d.plants);

@@ -165,11 +165,13 @@ static void extreme(monitor_state *m, size_t index, double value) {
 
 static void sample_take(feed *f) {
   monitor_state *m = &f->state;
-  void *sample[1] = {&m->sample};
-  plantbus_Sample *x = &m->sample;
-  const uint32_t revision = m->sample.revision;
+  plantbus_Sample taken;
+  void *sample[1] = {&taken};
   dds_sample_info_t info;
   if (dds_take(f->sample, sample, &info, 1, 1) != 1 || !info.valid_data) return;
+  const uint32_t revision = m->sample.revision;
+  plantbus_Sample *x = &m->sample;
+  *x = taken;
   if (x->input_count > plantbus_MAX_INPUTS) x->input_count = plantbus_MAX_INPUTS;
   if (x->output_count > plantbus_MAX_OUTPUTS) x->output_count = plantbus_MAX_OUTPUTS;
   if (m->has_sample && x->revision != revision) extremes_forget(f);

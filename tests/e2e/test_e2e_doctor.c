@@ -196,7 +196,6 @@ static void used_up_participant_indices_are_told(void **state) {
   cJSON *report = tool_json(DOCTOR, domain, environment, "--json", 1);
   tool_says(expect(report, "ports", "FAIL", "1 of 1 participant indices are in use"),
             "MaxAutoParticipantIndex");
-  expect(report, "domain", "FAIL", NULL);
   cJSON_Delete(report);
   dds_delete(participant);
 }

@@ -107,7 +107,7 @@ cJSON *tool_json(const char *name, uint32_t domain, const char *environment, con
   tool_result r = tool_run(name, domain, environment, line);
   if (r.code != code) fail_msg("%s %s ended with %d: %s", name, line, r.code, r.err);
   cJSON *json = cJSON_Parse(r.out);
-  if (!json) fail_msg("%s %s printed no JSON: %s", name, line, r.out);
+  if (!json) fail_msg("%s %s printed no JSON: %s%s", name, line, r.out, r.err);
   tool_free(&r);
   return json;
 }
