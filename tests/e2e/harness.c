@@ -67,13 +67,17 @@ e2e_child e2e_spawn(const char *const argv[]) {
 }
 
 void e2e_expect_line(e2e_child *child, const char *start, char *line) {
-  const double end = clock_seconds() + E2E_CAP;
+  e2e_expect_line_within(child, start, line, E2E_CAP);
+}
+
+void e2e_expect_line_within(e2e_child *child, const char *start, char *line, double seconds) {
+  const double end = clock_seconds() + seconds;
   size_t n = 0;
   for (;;) {
     struct pollfd p = {.fd = child->out, .events = POLLIN};
     const double left = end - clock_seconds();
     if (left <= 0.0 || poll(&p, 1, (int)(left * 1e3) + 1) <= 0)
-      fail_msg("no line '%s…' within %g s", start, E2E_CAP);
+      fail_msg("no line '%s…' within %g s", start, seconds);
     char c;
     if (read(child->out, &c, 1) != 1) fail_msg("the process ended before '%s…'", start);
     if (c != '\n' && n < 255) line[n++] = c;

@@ -31,6 +31,7 @@ e2e_child e2e_spawn(const char *const argv[]);
 
 // Reads up to a line that starts with `start` into line (256 octets); fails at the cap.
 void e2e_expect_line(e2e_child *child, const char *start, char *line);
+void e2e_expect_line_within(e2e_child *child, const char *start, char *line, double seconds);
 
 // Waits for the end of the process; its exit status, or −signal. Fails at the cap.
 int e2e_reap(e2e_child *child);
