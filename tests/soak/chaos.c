@@ -54,10 +54,16 @@ soak_count *soak_request(soak *s, const char *kind, const char *body, char **res
   return c;
 }
 
+// Now and then back to a model that there was, by its number.
 void soak_configure(soak *s) {
-  char body[512];
-  snprintf(body, sizeof body, "{\"patch\":%s,\"comment\":\"soak\"}",
-           soak_patch[soak_draw(s, SOAK_PATCHES)]);
+  char patch[SOAK_PATCH_TEXT], body[SOAK_PATCH_TEXT + 64];
+  if (s->seen.revision > 1 && soak_draw(s, 8) == 0) {
+    snprintf(body, sizeof body, "{\"revision\":%u}", 1 + soak_draw(s, s->seen.revision - 1));
+    soak_request(s, "revert", body, NULL);
+    return;
+  }
+  soak_patch((int)soak_draw(s, SOAK_PATCHES), pb_random_uniform(&s->random), patch);
+  snprintf(body, sizeof body, "{\"patch\":%s,\"comment\":\"soak\"}", patch);
   soak_request(s, "configure", body, NULL);
 }
 
@@ -125,7 +131,7 @@ void soak_disturb(soak *s) {
     snapshot_or_restore(s);
     break;
   case 4:
-    soak_request(s, "get_description", NULL, NULL);
+    soak_request(s, soak_draw(s, 2) ? "get_description" : "history", NULL, NULL);
     break;
   case 5:
     soak_request(s, "step", "{\"n\":10}", NULL);

@@ -10,7 +10,7 @@
 #include "session.h"
 #include "signal/random.h"
 
-enum { SOAK_CLIENTS = 4, SOAK_KINDS = 16 };
+enum { SOAK_CLIENTS = 4, SOAK_KINDS = 24 };
 
 // A request of the driver, by kind: what became of it. What the daemon does not know is counted
 // apart.
@@ -27,11 +27,11 @@ typedef struct soak_client {
 
 // What was seen on the bus and in /proc.
 typedef struct soak_seen {
-  uint64_t evicted, lost, reconfigured, configure_failed, fault_events, statuses, refused_commands;
+  uint64_t evicted, lost, reconfigured, configure_failed, statuses, refused_commands;
   uint32_t faults;    // all bits of all statuses
   uint64_t progress;  // steps taken, over all epochs
   uint64_t step;      // newest
-  uint32_t epoch;
+  uint32_t epoch, revision;
   double progress_at, longest_stop;  // s, on the driver's clock
   double *rss;                       // [rss_count] octets, one a second
   size_t rss_count, rss_room;

@@ -73,8 +73,11 @@ static pb_status work(const char *shipped, const char *directory, pb_error *err)
   snprintf(variant, sizeof variant, "%s/variant.json", directory);
   pb_status status = pb_json_read(shipped, &plant, &text, err);
   if (!status) status = plant_write(path, plant, err);
-  for (int i = 0; !status && i < SOAK_PATCHES; i++)
-    status = patch_try(&plant, soak_patch[i], variant, err);
+  for (int i = 0; !status && i < SOAK_PATCHES; i++) {
+    char patch[SOAK_PATCH_TEXT];
+    soak_patch(i, 0.5, patch);
+    status = patch_try(&plant, patch, variant, err);
+  }
   unlink(variant);
   cJSON_Delete(plant);
   free(text);

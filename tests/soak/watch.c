@@ -8,7 +8,7 @@
 #include "base/json.h"
 #include "soak.h"
 
-static const double longest_stop = 20.0;  // s without a step, of a plant with clients that attach
+static const double longest_stop = 10.0;  // s without a step, of a plant with clients that attach
 static const double growth = 1.2;
 
 static void event_count(soak_seen *seen, const char *kind) {
@@ -16,7 +16,18 @@ static void event_count(soak_seen *seen, const char *kind) {
   seen->lost += strcmp(kind, "lost") == 0;
   seen->reconfigured += strcmp(kind, "reconfigured") == 0;
   seen->configure_failed += strcmp(kind, "configure_failed") == 0;
-  seen->fault_events += strcmp(kind, "fault") == 0;
+}
+
+// Only a step counts, not a new epoch. Statuses and pings may come in another order than they were
+// made.
+static void progress_count(soak_seen *seen, uint32_t epoch, uint64_t step) {
+  const double now = soak_clock();
+  const bool further = epoch == seen->epoch && step > seen->step;
+  if (further) seen->progress += step - seen->step;
+  if (further || seen->progress_at <= 0.0) seen->progress_at = now;
+  if (now - seen->progress_at > seen->longest_stop) seen->longest_stop = now - seen->progress_at;
+  if (further || epoch > seen->epoch) seen->step = step;
+  if (epoch > seen->epoch) seen->epoch = epoch;
 }
 
 void soak_watch(soak *s) {
@@ -32,6 +43,8 @@ void soak_watch(soak *s) {
     if (info.valid_data) {
       s->seen.statuses++;
       s->seen.faults |= status->faults;
+      s->seen.revision = status->revision;
+      progress_count(&s->seen, status->epoch, status->step);
       s->seen.refused_commands = status->refused.session + status->refused.size +
                                  status->refused.non_finite + status->refused.step;
     }
@@ -60,16 +73,6 @@ static void rss_add(soak_seen *seen, double rss) {
     seen->rss_room = room;
   }
   seen->rss[seen->rss_count++] = rss;
-}
-
-static void progress_count(soak_seen *seen, uint32_t epoch, uint64_t step) {
-  const double now = soak_clock();
-  const bool same = epoch == seen->epoch;
-  if (same && step > seen->step) seen->progress += step - seen->step;
-  if (!same || step > seen->step || seen->progress_at <= 0.0) seen->progress_at = now;
-  if (now - seen->progress_at > seen->longest_stop) seen->longest_stop = now - seen->progress_at;
-  seen->epoch = epoch;
-  seen->step = step;
 }
 
 static double number(const cJSON *object, const char *key) {
@@ -128,15 +131,19 @@ static bool requests_judge(const soak *s) {
   return good;
 }
 
-static bool configure_judge(const soak *s) {
-  const soak_count *c = NULL;
+static uint64_t sent(const soak *s, const char *kind) {
   for (int i = 0; i < SOAK_KINDS && s->count[i].kind; i++)
-    if (strcmp(s->count[i].kind, "configure") == 0) c = &s->count[i];
-  printf("soak: reconfigurations: %" PRIu64 " swapped, %" PRIu64 " failed\n", s->seen.reconfigured,
-         s->seen.configure_failed);
+    if (strcmp(s->count[i].kind, kind) == 0) return s->count[i].sent;
+  return 0;
+}
+
+static bool configure_judge(const soak *s) {
+  const uint64_t asked = sent(s, "configure") + sent(s, "revert");
+  printf("soak: reconfigurations: %" PRIu64 " asked, %" PRIu64 " swapped, %" PRIu64 " failed\n",
+         asked, s->seen.reconfigured, s->seen.configure_failed);
   if (!s->must_configure) return true;
-  const bool good = c && s->seen.configure_failed == 0 && s->seen.reconfigured >= 2 &&
-                    2 * s->seen.reconfigured >= c->sent;
+  const bool good = s->seen.configure_failed == 0 && s->seen.reconfigured >= 2 &&
+                    2 * s->seen.reconfigured >= asked;
   if (!good) printf("soak: TOO FEW RECONFIGURATIONS\n");
   return good;
 }
