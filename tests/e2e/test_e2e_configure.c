@@ -6,38 +6,49 @@
 
 static const char *const paused[] = {"--mode", "paused", NULL};
 
+// One for all tests: domains are few.
+static e2e_daemon bench;
+
+static int daemon_begin(void **state) {
+  (void)state;
+  bench = e2e_daemon_start(E2E_BENCH, paused);
+  return 0;
+}
+
+static int daemon_finish(void **state) {
+  (void)state;
+  e2e_daemon_end(&bench);
+  return 0;
+}
+
 static void get_prints_the_plant_file_or_a_part(void **state) {
   (void)state;
-  e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, paused);
-  tool_result r = tool_run("plantbus-configure", daemon.domain, NULL, "get /components/mass/mass");
+  tool_result r = tool_run("plantbus-configure", bench.domain, NULL, "get /components/mass/mass");
   assert_string_equal(r.out, "5\n");
   tool_free(&r);
-  r = tool_run("plantbus-configure", daemon.domain, NULL, "get /outputs/1/name");
+  r = tool_run("plantbus-configure", bench.domain, NULL, "get /outputs/1/name");
   assert_string_equal(r.out, "y\n");
   tool_free(&r);
-  r = tool_run("plantbus-configure", daemon.domain, NULL, "get");
+  r = tool_run("plantbus-configure", bench.domain, NULL, "get");
   tool_says(r.out, "{\n  \"schema\": \"plantbus.plant/1\",\n  \"name\": \"bus-bench\",");
   tool_free(&r);
-  r = tool_run("plantbus-configure", daemon.domain, NULL, "get /components/mass/colour/x");
+  r = tool_run("plantbus-configure", bench.domain, NULL, "get /components/mass/colour/x");
   assert_int_equal(r.code, 1);
   tool_says(r.err, "/components/mass/colour: is not in the plant file");
   tool_free(&r);
-  e2e_daemon_end(&daemon);
 }
 
 static void a_dry_run_checks_and_sends_nothing(void **state) {
   (void)state;
-  e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, paused);
-  tool_result r = tool_run("plantbus-configure", daemon.domain, NULL,
-                           "set --dry-run /components/mass/mass 7.5");
+  tool_result r =
+      tool_run("plantbus-configure", bench.domain, NULL, "set --dry-run /components/mass/mass 7.5");
   assert_int_equal(r.code, 0);
   tool_says(r.out, "\"mass\": 7.5,");
   tool_free(&r);
-  r = tool_run("plantbus-configure", daemon.domain, NULL, "set --dry-run /components/mass/mass -1");
+  r = tool_run("plantbus-configure", bench.domain, NULL, "set --dry-run /components/mass/mass -1");
   assert_int_equal(r.code, 1);
   tool_says(r.err, "/components/mass/mass: expected a number");
   tool_free(&r);
-  e2e_daemon_end(&daemon);
 }
 
 static void a_wrong_command_line_is_refused(void **state) {
@@ -174,5 +185,5 @@ int main(void) {
       cmocka_unit_test(refusals_and_failures_end_with_1),
       cmocka_unit_test(history_is_a_table),
   };
-  return cmocka_run_group_tests(tests, NULL, NULL);
+  return cmocka_run_group_tests(tests, daemon_begin, daemon_finish);
 }

@@ -5,60 +5,78 @@
 
 static const char *const paused[] = {"--mode", "paused", NULL};
 
+// One for all tests: domains are few.
+static e2e_daemon bench;
+
+static int daemon_begin(void **state) {
+  (void)state;
+  bench = e2e_daemon_start(E2E_BENCH, paused);
+  return 0;
+}
+
+static int daemon_finish(void **state) {
+  (void)state;
+  e2e_daemon_end(&bench);
+  return 0;
+}
+
+static void restart(void) {
+  tool_result r = tool_run("plantbus-request", bench.domain, NULL, "reset");
+  assert_int_equal(r.code, 0);
+  tool_free(&r);
+}
+
 static void results_are_printed_as_json(void **state) {
   (void)state;
-  e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, paused);
-  cJSON *json = tool_json("plantbus-request", daemon.domain, NULL, "step '{\"n\": 7}'", 0);
+  restart();
+  cJSON *json = tool_json("plantbus-request", bench.domain, NULL, "step '{\"n\": 7}'", 0);
   assert_true(tool_member(json, "step")->valuedouble == 7.0);
   cJSON_Delete(json);
-  json = tool_json("plantbus-request", daemon.domain, NULL, "ping", 0);
+  json = tool_json("plantbus-request", bench.domain, NULL, "ping", 0);
   assert_true(tool_member(json, "step")->valuedouble == 7.0);
   assert_string_equal(tool_member(json, "mode")->valuestring, "paused");
   cJSON_Delete(json);
-  e2e_daemon_end(&daemon);
 }
 
 static void a_refusal_names_place_and_reason(void **state) {
   (void)state;
-  e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, paused);
-  tool_result r = tool_run("plantbus-request", daemon.domain, NULL, "step '{\"m\": 1}'");
+  tool_result r = tool_run("plantbus-request", bench.domain, NULL, "step '{\"m\": 1}'");
   assert_int_equal(r.code, 1);
   assert_string_equal(r.out, "");
   tool_says(r.err, "/m: step refused: is not a key of this request");
   tool_free(&r);
-  r = tool_run("plantbus-request", daemon.domain, NULL, "step '{\"n\": '");
+  r = tool_run("plantbus-request", bench.domain, NULL, "step '{\"n\": '");
   assert_int_equal(r.code, 1);
   tool_says(r.err, "argument: line 1, column");
   tool_free(&r);
-  r = tool_run("plantbus-request", daemon.domain, NULL, "step [1]");
+  r = tool_run("plantbus-request", bench.domain, NULL, "step [1]");
   assert_int_equal(r.code, 1);
   tool_says(r.err, "expected a JSON object");
   tool_free(&r);
-  r = tool_run("plantbus-request", daemon.domain, NULL, "");
+  r = tool_run("plantbus-request", bench.domain, NULL, "");
   assert_int_equal(r.code, 2);
   tool_says(r.err, "KIND is missing");
   tool_free(&r);
-  e2e_daemon_end(&daemon);
 }
 
 // The daemon says "accepted" to so many steps; without --wait the tool does not wait for them.
 static void wait_prints_the_ending_event(void **state) {
   (void)state;
-  e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, paused);
-  tool_result r = tool_run("plantbus-request", daemon.domain, NULL, "decimate '{\"n\": 1000}'");
+  restart();
+  tool_result r = tool_run("plantbus-request", bench.domain, NULL, "decimate '{\"n\": 1000}'");
   assert_int_equal(r.code, 0);
   tool_free(&r);
-  r = tool_run("plantbus-request", daemon.domain, NULL, "step '{\"n\": 100000}' --wait");
+  r = tool_run("plantbus-request", bench.domain, NULL, "step '{\"n\": 100000}' --wait");
   assert_int_equal(r.code, 0);
   tool_says(r.out, "{\"event\":\"stepped\"");
   tool_says(r.out, "\"step\":100000,");
   tool_free(&r);
-  e2e_daemon_end(&daemon);
 }
 
 static void no_daemon_is_told(void **state) {
   (void)state;
-  tool_result r = tool_run("plantbus-request", e2e_domain(), NULL, "ping --timeout 0.3");
+  const uint32_t nobody = e2e_domain();
+  tool_result r = tool_run("plantbus-request", nobody, NULL, "ping --timeout 0.3");
   assert_int_equal(r.code, 1);
   tool_says(r.err, "no daemon serves it");
   tool_free(&r);
@@ -110,11 +128,11 @@ static void an_ending_that_never_comes_is_told(void **state) {
 
 static void ask_tells_accepted_from_done(void **state) {
   (void)state;
-  e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, paused);
-  pb_session *session = e2e_open(&daemon);
+  pb_session *session = e2e_open(&bench);
   pb_answer answer;
   pb_session_event event;
   pb_error err = {0};
+  e2e_request(session, "reset", NULL);
   e2e_request(session, "decimate", "{\"n\":1000}");
   assert_int_equal(pb_session_ask(session, "step", "{\"n\":1}", 0.0, &answer, &err), PB_OK);
   assert_false(answer.accepted);
@@ -133,7 +151,6 @@ static void ask_tells_accepted_from_done(void **state) {
   assert_int_equal(pb_session_wait_event(session, "stepp step", 0, 0.1, NULL, &event, &err),
                    PB_ERR_STATE);
   pb_session_close(session);
-  e2e_daemon_end(&daemon);
 }
 
 int main(void) {
@@ -146,5 +163,5 @@ int main(void) {
       cmocka_unit_test(an_ending_that_never_comes_is_told),
       cmocka_unit_test(ask_tells_accepted_from_done),
   };
-  return cmocka_run_group_tests(tests, NULL, NULL);
+  return cmocka_run_group_tests(tests, daemon_begin, daemon_finish);
 }
