@@ -234,13 +234,10 @@ const char *hosts_configure(hosts_discovery discovery) {
   return hosts.config;
 }
 
-// `ip netns exec` becomes the program: its process id is the client's.
+// env and `ip netns exec` become the program: its process id is the client's.
 e2e_child hosts_spawn(const char *const argv[]) {
-  static const char *const place[] = {"/usr/sbin/ip", "/sbin/ip", "/usr/bin/ip", "/bin/ip", NULL};
-  size_t p = 0;
-  while (place[p] && access(place[p], X_OK) != 0) p++;
-  const char *all[WORDS] = {place[p], "netns", "exec", hosts.b};
-  for (size_t i = 0; argv[i] && i + 5 < WORDS; i++) all[i + 4] = argv[i];
+  const char *all[WORDS] = {"/usr/bin/env", "ip", "netns", "exec", hosts.b};
+  for (size_t i = 0; argv[i] && i + 6 < WORDS; i++) all[i + 5] = argv[i];
   return e2e_spawn(all);
 }
 

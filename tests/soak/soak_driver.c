@@ -74,6 +74,7 @@ static void client_look_after(soak *s, soak_client *member, double now) {
 }
 
 static void client_disturb(soak *s, soak_client *member, double now) {
+  if (member->pid <= 0) return;
   if (soak_draw(s, 2)) {
     kill(member->pid, SIGKILL);
     soak_reap(member->pid, end_within);

@@ -89,6 +89,10 @@ void soak_measure(soak *s) {
     progress_count(&s->seen, (uint32_t)number(json, "epoch"), (uint64_t)number(json, "step"));
   cJSON_Delete(json);
   free(result);
+  if (s->seen.rss_count % 60 == 0)
+    printf("soak: %zu min, %.1f MB, %" PRIu64 " steps, %" PRIu64 " reconfigurations\n",
+           s->seen.rss_count / 60, s->seen.rss[s->seen.rss_count - 1] * 1e-6, s->seen.progress,
+           s->seen.reconfigured);
 }
 
 static int ascending(const void *a, const void *b) {
