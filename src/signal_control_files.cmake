@@ -5,6 +5,6 @@ set(PB_SIGNAL_CONTROL_SOURCES
   signal/small_solve.c signal/spectrum.c signal/window.c
   control/fit.c control/fit_relocate.c control/fit_zeros.c control/iff.c control/loop.c
   control/loop_poles.c control/loop_stable.c
-  control/lti.c control/lti_analysis.c control/lti_c2d.c control/lti_ops.c
+  control/lti.c control/lti_analysis.c control/lti_c2d.c control/lti_model.c control/lti_ops.c
   control/poles.c control/rootlocus.c control/transient.c
 )

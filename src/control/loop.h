@@ -2,6 +2,7 @@
 //
 //   y(k) = P(z) u,   u = w + sign·gain·E K(z) z^{−delay} S y
 //
+// P is from command to measured output (PB_SAMPLED): the electronics' gains and delays are in it.
 // S takes the outputs that the controller reads, E places its outputs on the inputs they drive.
 // Positive feedback is sign = +1 (V_a = +K_IFF V_s). delay = 0: the command computed from y(k) is
 // held over [k, k+1), as in lockstep; delay = 1: over the next interval, as in real time.
@@ -74,7 +75,8 @@ pb_status pb_loop_solver_polish(pb_loop_solver *solver, double gain, pb_pole *po
 // the dense eigenvalues. Above by the argument principle: det(I − L(z)) turns −2π·(poles outside)
 // along the circle when the open loop has none outside; the phase is followed in steps of less than
 // a radian, finest where poles are near. *worst (may be NULL) is the pole of largest |z| that is
-// known. The open loop must be stable (a floating plant is PB_ERR_STATE above that size).
+// known. Delays of the electronics count as states. The open loop must be stable (a floating plant
+// is PB_ERR_STATE above that size).
 enum { PB_LOOP_STABLE_DENSE = 400 };
 pb_status pb_loop_solver_stable(pb_loop_solver *solver, double gain, bool *stable, pb_pole *worst,
                                 pb_error *err);

@@ -15,6 +15,7 @@ struct pb_loop_solver {
   bool exact;              // `plant` is the whole plant
   pb_lti plant;            // the loop's channels only, sampled; reduced unless exact
   pb_model channels;       // the whole plant with the loop's channels only; shares A with the model
+  size_t delays;           // samples of the electronics in the loop: of its inputs and its outputs
   size_t open_count;       // open-loop poles: plant, controller
   double complex *open;    // [open_count] as z
   size_t far_count;        // of the poles that the reduction left out

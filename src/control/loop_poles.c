@@ -25,6 +25,8 @@ void pb_loop_solver_free(pb_loop_solver *s) {
   free(s->channels.bd);
   free(s->channels.c);
   free(s->channels.d);
+  free(s->channels.input_electronics);
+  free(s->channels.output_electronics);
   free(s->open);
   free(s->far);
   free(s->h);
@@ -45,6 +47,7 @@ static pb_status select_channels(pb_loop_solver *s, pb_error *err) {
   *c = *m;
   c->nu = nu;
   c->ny = ny;
+  c->input_electronics = c->output_electronics = NULL;  // the model's: see select_electronics
   c->b = malloc((nx * nu + 1) * sizeof *c->b);
   c->bd = malloc((nx * nu + 1) * sizeof *c->bd);
   c->c = malloc((ny * nx + 1) * sizeof *c->c);
@@ -58,6 +61,26 @@ static pb_status select_channels(pb_loop_solver *s, pb_error *err) {
     size_t row = s->loop.output[o];
     for (size_t k = 0; k < nx; k++) c->c[o + k * ny] = m->c[row + k * m->ny];
     for (size_t i = 0; i < nu; i++) c->d[o + i * ny] = m->d[row + s->loop.input[i] * m->ny];
+  }
+  return PB_OK;
+}
+
+// Their electronics with them; counts the delays.
+static pb_status select_electronics(pb_loop_solver *s, pb_error *err) {
+  const pb_model *m = s->loop.model;
+  pb_model *c = &s->channels;
+  c->input_electronics = m->input_electronics ? malloc(c->nu * sizeof(pb_electronics)) : NULL;
+  c->output_electronics = m->output_electronics ? malloc(c->ny * sizeof(pb_electronics)) : NULL;
+  if ((m->input_electronics && !c->input_electronics) ||
+      (m->output_electronics && !c->output_electronics))
+    return pb_fail_memory(err, "loop");
+  for (size_t i = 0; c->input_electronics && i < c->nu; i++) {
+    c->input_electronics[i] = m->input_electronics[s->loop.input[i]];
+    s->delays += c->input_electronics[i].delay;
+  }
+  for (size_t o = 0; c->output_electronics && o < c->ny; o++) {
+    c->output_electronics[o] = m->output_electronics[s->loop.output[o]];
+    s->delays += c->output_electronics[o].delay;
   }
   return PB_OK;
 }
@@ -113,7 +136,6 @@ static pb_status prepare(pb_loop_solver *s, pb_error *err) {
   const pb_model *m = s->loop.model;
   size_t nu = s->loop.controller->ny, ny = s->loop.controller->nu;
   pb_model *reduced = NULL;
-  pb_lti whole = {0};
   s->exact = m->nx <= PB_LOOP_DENSE;
   s->h = malloc(ny * nu * sizeof *s->h);
   s->dh = malloc(ny * nu * sizeof *s->dh);
@@ -123,14 +145,12 @@ static pb_status prepare(pb_loop_solver *s, pb_error *err) {
   s->rhs = malloc(nu * nu * sizeof *s->rhs);
   bool have = s->h && s->dh && s->k && s->dk && s->m && s->rhs;
   pb_status status = have ? select_channels(s, err) : pb_fail_memory(err, "loop");
+  if (status == PB_OK) status = select_electronics(s, err);
   if (status == PB_OK && !s->exact) status = reduce(m, &reduced, err);
   const pb_model *low = reduced ? reduced : m;
   if (status == PB_OK) status = list_poles(s, low, err);
-  if (status == PB_OK) status = pb_lti_from_model(low, PB_SAMPLED, &whole, err);
-  if (status == PB_OK) {
-    status = pb_lti_select(&whole, s->loop.input, nu, s->loop.output, ny, &s->plant, err);
-  }
-  pb_lti_free(&whole);
+  const pb_lti_channels channels = {s->loop.input, s->loop.output, nu, ny};
+  if (status == PB_OK) status = pb_lti_from_channels(low, PB_SAMPLED, &channels, &s->plant, err);
   pb_model_free(reduced);
   return status;
 }
@@ -189,7 +209,7 @@ static bool log_derivative(pb_loop_solver *s, double gain, double complex z,
   size_t n = s->loop.controller->ny, nk = s->loop.controller->nu;
   double complex sum = 0;
   for (size_t j = 0; j < s->open_count; j++) sum += 1 / (z - s->open[j]);
-  if (s->loop.delay > 0) sum += (double)(n * s->loop.delay) / z;
+  if (s->loop.delay + s->delays > 0) sum += (double)(n * s->loop.delay + s->delays) / z;
   pb_model_evaluate(&s->channels, PB_SAMPLED, z, s->h, s->dh);
   if (pb_lti_evaluate(s->loop.controller, z, s->k, s->dk, NULL) != PB_OK) return false;
   delay_controller(s, gain, z);

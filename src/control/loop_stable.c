@@ -6,10 +6,25 @@
 #include "control/loop_internal.h"
 #include "control/lti_ops.h"
 
+// The whole plant with the loop closed, between the loop's channels only.
+static pb_status close_loop(const pb_loop_solver *s, double gain, pb_lti *closed, pb_error *err) {
+  const pb_loop *l = &s->loop;
+  const pb_lti_channels channels = {l->input, l->output, l->controller->ny, l->controller->nu};
+  pb_lti plant = {0}, controller = {0};
+  *closed = (pb_lti){0};
+  pb_status status = pb_lti_from_channels(l->model, PB_SAMPLED, &channels, &plant, err);
+  if (status == PB_OK) status = pb_loop_delayed_controller(l, gain, &controller, err);
+  controller.dt = plant.dt;  // equal to 1e-9, made equal to the bit
+  if (status == PB_OK) status = pb_lti_feedback(&plant, &controller, 1, closed, err);
+  pb_lti_free(&plant);
+  pb_lti_free(&controller);
+  return status;
+}
+
 static pb_status dense_stable(const pb_loop_solver *s, double gain, bool *stable, pb_pole *worst,
                               pb_error *err) {
   pb_lti closed;
-  pb_status status = pb_loop_closed(&s->loop, gain, &closed, err);
+  pb_status status = close_loop(s, gain, &closed, err);
   if (status != PB_OK) return status;
   double complex *z = malloc((closed.nx + 1) * sizeof *z);
   status = z ? pb_lti_poles(&closed, z, err) : pb_fail_memory(err, "loop");
@@ -82,9 +97,11 @@ static int ascending(const void *a, const void *b) {
 // powers of 3. *count of them, the caller frees.
 static double *make_grid(const pb_loop_solver *s, size_t *count) {
   enum { EVEN = 2000, AROUND = 9 };
-  double *grid = malloc((EVEN + 1 + s->open_count * AROUND) * sizeof *grid);
+  // A delay turns the determinant by itself: as many steps more keep each well below a radian.
+  size_t even = EVEN + 10 * s->delays;
+  double *grid = malloc((even + 1 + s->open_count * AROUND) * sizeof *grid);
   size_t n = 0;
-  for (size_t k = 0; grid && k <= EVEN; k++) grid[n++] = M_PI * (double)k / EVEN;
+  for (size_t k = 0; grid && k <= even; k++) grid[n++] = M_PI * (double)k / (double)even;
   for (size_t j = 0; grid && j < s->open_count; j++) {
     double theta = carg(s->open[j]), width = fabs(1 - cabs(s->open[j]));
     if (theta < 0 || width > 0.1) continue;
@@ -146,7 +163,7 @@ pb_status pb_loop_solver_stable(pb_loop_solver *s, double gain, bool *stable, pb
   *stable = true;
   pb_status status = pb_loop_check(&s->loop, gain, err);
   if (status != PB_OK) return status;
-  if (s->loop.model->nx + s->loop.controller->nx <= PB_LOOP_STABLE_DENSE) {
+  if (s->loop.model->nx + s->loop.controller->nx + s->delays <= PB_LOOP_STABLE_DENSE) {
     return dense_stable(s, gain, stable, worst, err);
   }
   long outside = 0;

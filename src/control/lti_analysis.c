@@ -214,33 +214,3 @@ done:
   free(x);
   return status;
 }
-
-static bool has_direct_term(const pb_model *model) {
-  for (size_t k = 0; k < model->ny * model->nu; k++) {
-    if (model->d[k] != 0) return true;
-  }
-  return false;
-}
-
-pb_status pb_lti_from_model(const pb_model *model, pb_time_base base, pb_lti *out, pb_error *err) {
-  bool sampled = base == PB_SAMPLED, hold = sampled && has_direct_term(model);
-  size_t nx = model->nx, nu = model->nu, ny = model->ny, n = nx + (hold ? nu : 0);
-  pb_status status = pb_lti_new(n, nu, ny, sampled ? 1 / model->sample_rate : 0, out, err);
-  if (status != PB_OK) return status;
-  const double *a = sampled ? model->ad : model->a, *b = sampled ? model->bd : model->b;
-  for (size_t k = 0; k < model->blocks; k++) {
-    size_t start = model->block_start[k], size = model->block_start[k + 1] - start;
-    const double *block = a + model->block_value[k];
-    for (size_t c = 0; c < size; c++) {
-      for (size_t r = 0; r < size; r++) out->a[start + r + (start + c) * n] = block[r + c * size];
-    }
-  }
-  for (size_t i = 0; i < nu; i++) {
-    for (size_t k = 0; k < nx; k++) out->b[k + i * n] = b[k + i * nx];
-    if (hold) out->b[nx + i + i * n] = 1;
-  }
-  memcpy(out->c, model->c, ny * nx * sizeof *out->c);
-  double *direct = hold ? out->c + ny * nx : out->d;
-  memcpy(direct, model->d, ny * nu * sizeof *direct);
-  return PB_OK;
-}

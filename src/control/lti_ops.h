@@ -61,9 +61,21 @@ pb_status pb_lti_frf(const pb_lti *lti, const double *hz, size_t nf, double comp
 pb_status pb_lti_evaluate(const pb_lti *lti, double complex point, double complex *h,
                           double complex *dh, pb_error *err);
 
-// The same system as a compiled model. PB_SAMPLED: y(k) = C x(k) + D u(k−1), so that a model with D
-// gets nu more states which hold u(k−1).
+// The same system as a compiled model, from the inputs and to the outputs that the time base means.
+// PB_SAMPLED, PB_APPLIED: y(k) = C x(k) + D u(k−1), so that a model with D gets nu more states
+// which hold u(k−1); delays of the electronics are a state a sample. PB_CONTINUOUS: PB_ERR_ARGUMENT
+// where a signal is delayed.
 pb_status pb_lti_from_model(const pb_model *model, pb_time_base base, pb_lti *out, pb_error *err);
+
+// Channels of a model.
+typedef struct pb_lti_channels {
+  const size_t *input, *output;  // [nu], [ny]; NULL: the first nu, ny in order
+  size_t nu, ny;
+} pb_lti_channels;
+
+// The same of chosen inputs and outputs, without the delays of the others.
+pb_status pb_lti_from_channels(const pb_model *model, pb_time_base base,
+                               const pb_lti_channels *channels, pb_lti *out, pb_error *err);
 
 // One sample of a discrete system: y = C x + D u, then x ← A x + B u. x[nx] and scratch[nx] are the
 // caller's; no allocation. [rt]

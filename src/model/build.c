@@ -62,6 +62,8 @@ void pb_model_free(pb_model *m) {
   free(m->bd);
   free(m->c);
   free(m->d);
+  free(m->input_electronics);
+  free(m->output_electronics);
   free(m);
 }
 
@@ -186,7 +188,7 @@ static void copy_header(const pb_model *from, pb_model *to) {
   memcpy(to->d, from->d, from->ny * from->nu * sizeof(double));
 }
 
-static pb_status copy_names(const pb_model *from, pb_model *to, pb_error *err) {
+static pb_status copy_signals(const pb_model *from, pb_model *to, pb_error *err) {
   to->name = from->name ? pb_text_copy(from->name) : NULL;
   bool ok = !from->name || to->name;
   for (size_t i = 0; i < from->nu + from->ny && ok; i++) {
@@ -196,7 +198,8 @@ static pb_status copy_names(const pb_model *from, pb_model *to, pb_error *err) {
     t->unit = pb_text_copy(s->unit);
     ok = t->name && t->unit;
   }
-  return ok ? PB_OK : pb_fail_memory(err, "");
+  if (!ok) return pb_fail_memory(err, "");
+  return pb_electronics_attach(to, from->input_electronics, from->output_electronics, err);
 }
 
 // Numbers that are each fine may still overflow in products.
@@ -233,7 +236,7 @@ static pb_status rebuild(const pb_model *m, double hz, pb_model **out, pb_error 
   }
   qsort(order, m->blocks, sizeof *order, rank_order);
   pb_model *copy = pb_model_allocate(nx, m->nu, m->ny, m->modes, kept, values);
-  pb_status st = copy ? copy_names(m, copy, err) : pb_fail_memory(err, "");
+  pb_status st = copy ? copy_signals(m, copy, err) : pb_fail_memory(err, "");
   if (!st) {
     copy_header(m, copy);
     copy->max_frequency = hz;

@@ -207,6 +207,28 @@ static void fill_feedthrough(const pb_system *s, const pb_modes *m, double *d) {
   dgemm_("N", "N", &ny, &nu, &n, &one, m->output[2], &ny, m->force, &n, &one, d, &ny);
 }
 
+// The electronics of one list of ports, the caller's; NULL where no port has any.
+static pb_status list_electronics(const pb_port *port, size_t count, pb_electronics **out,
+                                  pb_error *err) {
+  bool any = false;
+  for (size_t i = 0; i < count; i++) any = any || port[i].has_electronics;
+  if (!any) return PB_OK;
+  *out = malloc(count * sizeof **out);
+  if (!*out) return pb_fail_memory(err, "electronics");
+  for (size_t i = 0; i < count; i++)
+    (*out)[i] = port[i].has_electronics ? port[i].electronics : pb_electronics_none();
+  return PB_OK;
+}
+
+static pb_status fill_signals(const pb_system *s, pb_model *model, pb_error *err) {
+  const pb_plant *p = s->plant;
+  pb_status st = copy_signals(p->input, s->nu, model->input, err);
+  if (!st) st = copy_signals(p->output, s->ny, model->output, err);
+  if (!st) st = list_electronics(p->input, s->nu, &model->input_electronics, err);
+  if (!st) st = list_electronics(p->output, s->ny, &model->output_electronics, err);
+  return st;
+}
+
 static pb_status fill_header(const pb_system *s, const pb_modes *m, pb_model *model,
                              pb_error *err) {
   const pb_plant *p = s->plant;
@@ -219,8 +241,7 @@ static pb_status fill_header(const pb_system *s, const pb_modes *m, pb_model *mo
     model->mode_damping[j] = m->omega[j] > 0 ? m->damping[j + j * m->n] / (2 * m->omega[j]) : 0;
   }
   fill_feedthrough(s, m, model->d);
-  pb_status st = copy_signals(p->input, s->nu, model->input, err);
-  return st ? st : copy_signals(p->output, s->ny, model->output, err);
+  return fill_signals(s, model, err);
 }
 
 pb_status pb_model_compile(const pb_system *s, pb_warnings *warnings, pb_model **out,

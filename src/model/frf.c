@@ -1,6 +1,8 @@
 // Frequency responses, poles and static gains of a compiled plant, block by block: see model.h.
 //
 //   H(p) = Σ_blocks C_b (p I − A_b)⁻¹ B_b + D        (sampled: A_d, B_d, and D z⁻¹)
+//
+// then, for the electronics, entry (o, i) times g_i e^{−s(d_i + d_o)T} or g_i z^{−(d_i + d_o)}.
 #include <complex.h>
 #include <math.h>
 #include <stdlib.h>
@@ -16,7 +18,7 @@ typedef struct basis {
 } basis;
 
 static basis choose(const pb_model *m, pb_time_base base) {
-  return base == PB_SAMPLED ? (basis){m->ad, m->bd} : (basis){m->a, m->b};
+  return base == PB_CONTINUOUS ? (basis){m->a, m->b} : (basis){m->ad, m->bd};
 }
 
 // r = (p I − A)⁻¹ for a 2 × 2 block, column-major.
@@ -65,15 +67,45 @@ static void add_block(const pb_model *m, const basis *at, size_t k, double compl
   }
 }
 
+static double complex power(double complex x, uint32_t n) {
+  double complex value = 1;
+  for (; n; n >>= 1, x *= x)
+    if (n & 1) value *= x;
+  return value;
+}
+
+// h ← g E h, dh ← g (E dh + E' h), E the delay of d samples.
+static void add_electronics(const pb_model *m, pb_time_base base, double complex p,
+                            double complex *h, double complex *dh) {
+  for (size_t i = 0; i < m->nu; i++) {
+    pb_electronics in =
+        base == PB_APPLIED ? pb_electronics_none() : pb_model_input_electronics(m, i);
+    for (size_t o = 0; o < m->ny; o++) {
+      size_t k = o * m->nu + i;
+      uint32_t d = in.delay + pb_model_output_electronics(m, o).delay;
+      if (d > 0) {
+        bool continuous = base == PB_CONTINUOUS;
+        double complex e = continuous ? cexp(-p * (d / m->sample_rate)) : power(1 / p, d);
+        double complex slope = continuous ? -(d / m->sample_rate) : -(double)d / p;
+        if (dh) dh[k] = e * (dh[k] + slope * h[k]);
+        h[k] *= e;
+      }
+      h[k] *= in.gain;
+      if (dh) dh[k] *= in.gain;
+    }
+  }
+}
+
 // `work` and `pivot` serve the blocks above 2 × 2 and may be NULL without such blocks.
 static void evaluate(const pb_model *m, pb_time_base base, double complex p, double complex *h,
                      double complex *dh, double complex *work, int *pivot) {
   basis at = choose(m, base);
-  double complex through = base == PB_SAMPLED ? 1 / p : 1;
+  bool sampled = base != PB_CONTINUOUS;
+  double complex through = sampled ? 1 / p : 1;
   for (size_t o = 0; o < m->ny; o++) {
     for (size_t i = 0; i < m->nu; i++) {
       h[o * m->nu + i] = m->d[o + i * m->ny] * through;
-      if (dh) dh[o * m->nu + i] = base == PB_SAMPLED ? -m->d[o + i * m->ny] / (p * p) : 0;
+      if (dh) dh[o * m->nu + i] = sampled ? -m->d[o + i * m->ny] / (p * p) : 0;
     }
   }
   for (size_t k = 0; k < m->pairs; k++) {
@@ -87,6 +119,7 @@ static void evaluate(const pb_model *m, pb_time_base base, double complex p, dou
     }
   }
   for (size_t k = m->pairs; k < m->blocks; k++) add_block(m, &at, k, p, h, dh, work, pivot);
+  if (m->input_electronics || m->output_electronics) add_electronics(m, base, p, h, dh);
 }
 
 // Scratch of `evaluate` for models with blocks above 2 × 2.
@@ -125,7 +158,7 @@ pb_status pb_model_frf(const pb_model *m, pb_time_base base, const double *hz, s
   pb_status st = scratch_new(m, &work, &pivot) ? PB_OK : pb_fail_memory(err, "");
   for (size_t f = 0; f < nf && !st; f++) {
     double w = two_pi * hz[f];
-    double complex p = base == PB_SAMPLED ? cexp(I * w / m->sample_rate) : I * w;
+    double complex p = base == PB_CONTINUOUS ? I * w : cexp(I * w / m->sample_rate);
     evaluate(m, base, p, h + f * m->ny * m->nu, NULL, work, pivot);
   }
   free(work);

@@ -5,6 +5,9 @@
 //   x(k+1) = A_d x(k) + B_d u(k)         eigenvectors are too ill-conditioned to separate the modes
 //   y(k)   = C x(k) + D u(k−1)           sampled with the input of the last interval still held
 //
+// u is what acts and y what the plant does; signal electronics (electronics.h) may lie between a
+// command and u, and between y and what is measured. Models whose signals have none do without.
+//
 // A_d = e^{A T}, B_d = ∫₀ᵀ e^{A s} ds B are exact for an input that is constant over each step.
 // A pb_model never changes after it is built: any number of threads may read it. What changes is
 // the pb_state. Matrices are column-major.
@@ -17,6 +20,7 @@
 #include <stdint.h>
 
 #include "base/status.h"
+#include "model/electronics.h"
 
 struct pb_system;
 
@@ -45,14 +49,19 @@ typedef struct pb_model {
   double *b, *bd;        // nx × nu
   double *c;             // ny × nx
   double *d;             // ny × nu
+  pb_electronics *input_electronics;   // [nu], NULL: no input has any
+  pb_electronics *output_electronics;  // [ny], NULL: no output has any
 } pb_model;
 
 // Everything that affects the next output, flat: copying pb_state_bytes() bytes is a snapshot.
 typedef struct pb_state {
   uint64_t step;  // steps taken since the start of the epoch; t = step / sample_rate
   size_t nx, nu;  // of the model it belongs to
-  double data[];  // x [nx], then u [nu]: the input held over the last interval; then, for a model
-                  // with blocks above 2 × 2, scratch [widest]
+  uint64_t
+      saturated;  // bit i: input i was cut in the last interval, by its slew limit or its range
+  double data[];  // x [nx], then u [nu]: the input held over the last interval, as applied; then,
+                  // for a model with blocks above 2 × 2, scratch [widest]; then what the
+                  // electronics remember: delay lines, generators, the outputs measured now
 } pb_state;
 
 // Compiles an assembled system: modes, modal form, truncation, discretisation. [init]
@@ -74,23 +83,32 @@ int pb_model_output(const pb_model *model, const char *name);
 // Size in bytes of a state of this model. [any]
 size_t pb_state_bytes(const pb_model *model);
 
-// A zeroed state (at rest, step 0), owned by the caller (free with free). NULL: out of memory.
+// A state at rest at step 0, owned by the caller (free with free). NULL: out of memory.
 // [init]
 pb_state *pb_state_new(const pb_model *model);
 
-// At rest, step 0. [rt]
+// At rest, step 0, generators of noise seeded. [rt]
 void pb_state_reset(const pb_model *model, pb_state *state);
 
-// y(k) = C x(k) + D u(k−1), y [ny]. No allocation, no failure. [rt]
+// The outputs y [ny] of the current step: C x(k) + D u(k−1), of a model with output electronics as
+// measured. Repeatable: asking changes nothing. No allocation, no failure. [rt]
 void pb_step_output(const pb_model *model, const pb_state *state, double *y);
 
-// x(k+1) = A_d x(k) + B_d u(k), step += 1; u [nu] becomes the held input. No allocation. [rt]
-void pb_step_advance(const pb_model *model, pb_state *state, const double *u);
+// x(k+1) = A_d x(k) + B_d u(k), step += 1. command [nu] is held over the interval; what its
+// electronics make of it, or else the command itself, is u(k) and becomes the held input.
+// No allocation. [rt]
+void pb_step_advance(const pb_model *model, pb_state *state, const double *command);
 
 typedef enum pb_time_base {
   PB_CONTINUOUS,  // H(jω) = C (jωI − A)⁻¹ B + D
   PB_SAMPLED,     // H(z) = C (zI − A_d)⁻¹ B_d + D z⁻¹, z = e^{jωT}: from u(k) to y(k)
+  PB_APPLIED,     // the same from the inputs as applied: without input gain and input delay
 } pb_time_base;
+
+// PB_CONTINUOUS and PB_SAMPLED are from command to measured output: of the electronics they include
+// the input's gain and both delays, as e^{−sdT} or z^{−d}. Quantisation, noise, slew and saturation
+// are no part of a linear response. PB_APPLIED is what an experiment finds that takes the inputs
+// from the samples; it includes the output's delay.
 
 // Frequency responses at hz[nf] (Hz, > 0 where the plant has poles at 0).
 // h is [nf][ny][nu], row-major as written: h[(f*ny + o)*nu + i]. Cost nf × nx × ny-or-nu.
@@ -104,14 +122,17 @@ pb_status pb_model_frf(const pb_model *model, pb_time_base base, const double *h
 void pb_model_evaluate(const pb_model *model, pb_time_base base, double complex point,
                        double complex *h, double complex *dh);
 
-// Poles in rad/s (continuous) or as z (sampled): poles[nx], conjugates adjacent. [init]
+// Poles in rad/s (continuous) or as z (sampled): poles[nx], conjugates adjacent. Those of delay
+// lines, at z = 0, are not listed. [init]
 pb_status pb_model_poles(const pb_model *model, pb_time_base base, double complex *poles,
                          pb_error *err);
 
-// Static gains, [ny][nu]; entries are infinite where the plant floats. [init]
+// Static gains from command to output, [ny][nu]; entries are infinite where the plant floats.
+// [init]
 pb_status pb_model_dc(const pb_model *model, double *gain, pb_error *err);
 
-// A copy without the blocks whose |λ| exceeds 2π·hz; their static contribution goes into D. [init]
+// A copy without the blocks whose |λ| exceeds 2π·hz; their static contribution goes into D. The
+// electronics stay. [init]
 pb_status pb_model_truncate(const pb_model *model, double hz, pb_model **out, pb_error *err);
 
 // The whole compiled model as one array of doubles (names excluded), so that a bus can carry it to

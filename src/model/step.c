@@ -3,10 +3,19 @@
 #include <string.h>
 
 #include "model/model.h"
+#include "model/step_internal.h"
+
+static bool has_electronics(const pb_model *m) {
+  return m->input_electronics || m->output_electronics;
+}
+
+size_t pb_state_plain(const pb_model *m) {
+  return m->nx + m->nu + (m->pairs < m->blocks ? m->widest : 0);
+}
 
 size_t pb_state_bytes(const pb_model *m) {
-  size_t scratch = m->pairs < m->blocks ? m->widest : 0;
-  return sizeof(pb_state) + (m->nx + m->nu + scratch) * sizeof(double);
+  size_t electronics = has_electronics(m) ? pb_electronics_size(m) : 0;
+  return sizeof(pb_state) + (pb_state_plain(m) + electronics) * sizeof(double);
 }
 
 pb_state *pb_state_new(const pb_model *m) {
@@ -19,9 +28,10 @@ void pb_state_reset(const pb_model *m, pb_state *s) {
   memset(s, 0, pb_state_bytes(m));
   s->nx = m->nx;
   s->nu = m->nu;
+  if (has_electronics(m)) pb_electronics_reset(m, s);
 }
 
-void pb_step_output(const pb_model *m, const pb_state *s, double *y) {
+void pb_step_motion(const pb_model *m, const pb_state *s, double *y) {
   const double *x = s->data, *u = s->data + m->nx;
   size_t ny = m->ny;
   for (size_t o = 0; o < ny; o++) y[o] = 0;
@@ -33,6 +43,21 @@ void pb_step_output(const pb_model *m, const pb_state *s, double *y) {
     const double *d = m->d + i * ny;
     for (size_t o = 0; o < ny; o++) y[o] += d[o] * u[i];
   }
+}
+
+double pb_step_motion_of(const pb_model *m, const pb_state *s, size_t o) {
+  const double *x = s->data, *u = s->data + m->nx;
+  double y = 0;
+  for (size_t j = 0; j < m->nx; j++) y += m->c[o + j * m->ny] * x[j];
+  for (size_t i = 0; i < m->nu; i++) y += m->d[o + i * m->ny] * u[i];
+  return y;
+}
+
+void pb_step_output(const pb_model *m, const pb_state *s, double *y) {
+  if (m->output_electronics)
+    memcpy(y, pb_electronics_measured(m, s), m->ny * sizeof *y);
+  else
+    pb_step_motion(m, s, y);
 }
 
 // x ← A_d x over the 2 × 2 blocks.
@@ -52,8 +77,13 @@ static void advance_block(const double *ad, size_t n, double *x, double *scratch
     for (size_t i = 0; i < n; i++) x[i] += ad[i + j * n] * scratch[j];
 }
 
-void pb_step_advance(const pb_model *m, pb_state *s, const double *u) {
+void pb_step_advance(const pb_model *m, pb_state *s, const double *command) {
   double *x = s->data, *held = s->data + m->nx;
+  const double *u = command;
+  if (m->input_electronics) {
+    pb_electronics_apply(m, s, command);
+    u = held;
+  }
   advance_pairs(m->ad, x, m->pairs);
   for (size_t k = m->pairs; k < m->blocks; k++) {
     size_t start = m->block_start[k];
@@ -67,4 +97,5 @@ void pb_step_advance(const pb_model *m, pb_state *s, const double *u) {
     for (size_t j = 0; j < m->nx; j++) x[j] += b[j] * ui;
   }
   s->step++;
+  if (m->output_electronics) pb_electronics_sample(m, s);
 }

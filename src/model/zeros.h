@@ -13,6 +13,7 @@ enum { PB_ZEROS_DIRECT = 420 };  // states up to which all zeros are found
 
 // Zeros in rad/s of the continuous-time model from input[count] to output[count] (indices into the
 // model's lists), ascending in magnitude, conjugates adjacent (positive imaginary part first).
+// Gains and delays of the electronics move no zero.
 // Modes that the channel does not see are no zeros. max_hz > 0: only zeros with |Im s| ≤ 2π·max_hz;
 // needed for models of more than PB_ZEROS_DIRECT states; 0: all.
 // *zeros [*zero_count] is owned by the caller (free). [init]

@@ -51,6 +51,10 @@ pb_status pb_loader_signal(pb_loader *loader, const cJSON *object, const char *p
                            bool is_input, const pb_plant *plant, pb_port *out);
 void pb_port_clear(pb_port *port);
 
+// Reads an "electronics" object, of an input or of an output. Fails with PB_ERR_SCHEMA.
+pb_status pb_loader_electronics(const cJSON *object, const char *pointer, bool is_input,
+                                pb_electronics *out, pb_error *err);
+
 // Expands "template": *out is a copy of the plant file's object with the template's components,
 // connections and signals, changed by the file's own entries of the same name; without a template,
 // a plain copy.

@@ -8,6 +8,7 @@
 #include <stddef.h>
 
 #include "base/status.h"
+#include "model/electronics.h"
 #include "plant/element.h"
 
 #define PB_MAX_INPUTS 32  // of the bus's Sample and Command types
@@ -138,6 +139,8 @@ typedef struct pb_port {
   pb_anchor frame;      // the others; `to` of relative_displacement
   pb_anchor from;       // relative_displacement
   double direction[3];  // unit vector, world axes
+  bool has_electronics;
+  pb_electronics electronics;
 } pb_port;
 
 typedef struct pb_plant {

@@ -108,11 +108,21 @@ static pb_status read_frames(const pb_reader *r, const pb_plant *plant, bool two
   return st ? st : pb_reader_direction(r, "direction", true, out->direction, NULL);
 }
 
+static pb_status read_electronics(const pb_reader *r, bool is_input, pb_port *out) {
+  char where[256];
+  const cJSON *object = pb_reader_find(r, "electronics", where);
+  out->has_electronics = object != NULL;
+  if (!object) return PB_OK;
+  return pb_loader_electronics(object, where, is_input, &out->electronics, r->err);
+}
+
 pb_status pb_loader_signal(pb_loader *loader, const cJSON *object, const char *pointer,
                            bool is_input, const pb_plant *plant, pb_port *out) {
-  static const char *const with_component[] = {"name", "type", "component", NULL};
-  static const char *const with_frame[] = {"name", "type", "frame", "direction", NULL};
-  static const char *const with_two[] = {"name", "type", "from", "to", "direction", NULL};
+  static const char *const with_component[] = {"name", "type", "component", "electronics", NULL};
+  static const char *const with_frame[] = {"name",      "type",        "frame",
+                                           "direction", "electronics", NULL};
+  static const char *const with_two[] = {"name",      "type",        "from", "to",
+                                         "direction", "electronics", NULL};
   static const char *const *const known[] = {with_component, with_frame, with_two};
   pb_reader r;
   const char *name;
@@ -127,6 +137,8 @@ pb_status pb_loader_signal(pb_loader *loader, const cJSON *object, const char *p
   out->name = pb_text_copy(name);
   out->pointer = pb_text_copy(pointer);
   if (!out->name || !out->pointer) return pb_fail_memory(loader->err, pointer);
+  st = read_electronics(&r, is_input, out);
+  if (st) return st;
   if (type->needs == COMPONENT) return read_component(&r, plant, out);
   return read_frames(&r, plant, type->needs == TWO_FRAMES, out);
 }

@@ -116,9 +116,33 @@ static pb_status place_struts(pb_hexapod *h, pb_error *err) {
   return PB_OK;
 }
 
+// One list of electronics: checked here, where the file says it, and read again in each signal.
+static pb_status read_electronics_of(const pb_reader *r, const char *key, bool is_input,
+                                     const cJSON **out) {
+  char where[256];
+  pb_electronics ignored;
+  *out = pb_reader_find(r, key, where);
+  return *out ? pb_loader_electronics(*out, where, is_input, &ignored, r->err) : PB_OK;
+}
+
+static pb_status read_electronics(const pb_reader *r, pb_hexapod_electronics *out) {
+  static const char *const known[] = {"actuators", "sensors", "metrology", NULL};
+  char where[256];
+  pb_reader part;
+  const cJSON *object = pb_reader_find(r, "electronics", where);
+  if (!object) return PB_OK;
+  pb_status st = pb_reader_open(object, where, NULL, &part, r->err);
+  if (!st) st = pb_reader_known(&part, known, NULL, 0);
+  if (!st) st = read_electronics_of(&part, "actuators", true, &out->actuators);
+  if (!st) st = read_electronics_of(&part, "sensors", false, &out->sensors);
+  if (!st) st = read_electronics_of(&part, "metrology", false, &out->metrology);
+  return st;
+}
+
 pb_status pb_hexapod_read(const cJSON *file, pb_hexapod *h, pb_error *err) {
-  static const char *const known[] = {"type",     "geometry",     "platform",  "payload",
-                                      "actuator", "bottom_joint", "top_joint", NULL};
+  static const char *const known[] = {"type",      "geometry",    "platform",
+                                      "payload",   "actuator",    "bottom_joint",
+                                      "top_joint", "electronics", NULL};
   const char *type, *pointer = "/template";
   char where[256];
   pb_reader r;
@@ -139,5 +163,6 @@ pb_status pb_hexapod_read(const cJSON *file, pb_hexapod *h, pb_error *err) {
   if (!st) st = read_model(&r, "bottom_joint", &h->bottom_joint);
   if (!st) st = read_model(&r, "top_joint", &h->top_joint);
   if (!st) st = read_actuator(h, models, err);
+  if (!st) st = read_electronics(&r, &h->electronics);
   return st ? st : place_struts(h, err);
 }

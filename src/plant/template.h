@@ -19,6 +19,13 @@ typedef struct pb_hexapod_strut {
   double length;             // joint to joint, m
 } pb_hexapod_strut;
 
+// Electronics for all signals of one kind, as the file gives them; NULL: none.
+typedef struct pb_hexapod_electronics {
+  const cJSON *actuators;  // Va…, f…
+  const cJSON *sensors;    // Vs…, fm…
+  const cJSON *metrology;  // dL…, Dx … Rz
+} pb_hexapod_electronics;
+
 typedef struct pb_hexapod {
   pb_hexapod_geometry geometry;
   pb_hexapod_solid platform, payload;
@@ -26,6 +33,7 @@ typedef struct pb_hexapod {
   double point_of_interest_height;
   const cJSON *actuator, *bottom_joint, *top_joint;  // model names or objects
   const char *actuator_type;
+  pb_hexapod_electronics electronics;
   double half_height;  // of a super-element actuator
   double ends[2];      // its end nodes, 1-based as in the file
   pb_hexapod_strut strut[6];

@@ -152,6 +152,10 @@ static cJSON *add_signal(builder *b, cJSON *list, const char *name, const char *
   return signal;
 }
 
+static void add_electronics(builder *b, cJSON *signal, const cJSON *electronics) {
+  if (electronics) add_copy(b, signal, "electronics", electronics);
+}
+
 static void add_strut_signals(builder *b, const pb_hexapod *h) {
   bool force = !strcmp(h->actuator_type, "strut_1dof");
   char name[16], component[16], frame[24];
@@ -160,9 +164,11 @@ static void add_strut_signals(builder *b, const pb_hexapod *h) {
     snprintf(name, sizeof name, force ? "f%d" : "Va%d", k);
     cJSON *input = add_signal(b, b->inputs, name, force ? "actuator_force" : "actuator_voltage");
     add_string(b, input, "component", component);
+    add_electronics(b, input, h->electronics.actuators);
     snprintf(name, sizeof name, force ? "fm%d" : "Vs%d", k);
     cJSON *output = add_signal(b, b->outputs, name, force ? "sensor_force" : "sensor_voltage");
     add_string(b, output, "component", component);
+    add_electronics(b, output, h->electronics.sensors);
   }
   for (int k = 1; k <= 6; k++) {
     snprintf(name, sizeof name, "dL%d", k);
@@ -170,10 +176,11 @@ static void add_strut_signals(builder *b, const pb_hexapod *h) {
     cJSON *metrology = add_signal(b, b->outputs, name, "displacement");
     add_string(b, metrology, "frame", frame);
     add_vector(b, metrology, "direction", h->strut[k - 1].z);
+    add_electronics(b, metrology, h->electronics.metrology);
   }
 }
 
-static void add_point_of_interest(builder *b) {
+static void add_point_of_interest(builder *b, const pb_hexapod *h) {
   static const char *const load[6] = {"Fx", "Fy", "Fz", "Mx", "My", "Mz"};
   static const char *const motion[6] = {"Dx", "Dy", "Dz", "Rx", "Ry", "Rz"};
   for (int i = 0; i < 6; i++) {
@@ -184,6 +191,7 @@ static void add_point_of_interest(builder *b) {
     add_string(b, output, "frame", "platform.point_of_interest");
     add_vector(b, input, "direction", direction);
     add_vector(b, output, "direction", direction);
+    add_electronics(b, output, h->electronics.metrology);
   }
 }
 
@@ -249,7 +257,7 @@ pb_status pb_loader_expand(const cJSON *file, cJSON **out, pb_error *err) {
     add_bodies(&b, &h);
     add_struts(&b, &h);
     add_strut_signals(&b, &h);
-    add_point_of_interest(&b);
+    add_point_of_interest(&b, &h);
   }
   bool ok = b.ok && merge_section(copy, "components", b.components) &&
             merge_section(copy, "connections", b.connections) &&
