@@ -24,7 +24,8 @@ void pb_bus_publish_sample(pb_daemon *d) {
 }
 
 void pb_bus_note_faults(pb_daemon *d, const pb_record *record) {
-  static const char *const name[PB_FLAG_COUNT] = {"held", "late", "non-finite", "overrun"};
+  static const char *const name[PB_FLAG_COUNT] = {"held", "late", "non-finite", "overrun",
+                                                  "saturated"};
   const uint32_t fresh = record->flags & ~d->faults;
   if (!fresh) return;
   d->faults |= fresh;

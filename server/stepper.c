@@ -13,6 +13,7 @@ static void record_make(pb_stepper *stepper, uint32_t flags) {
   memcpy(now->u, stepper->state->data + stepper->state->nx, model->nu * sizeof(double));
   for (size_t i = 0; i < model->ny; i++)
     if (!isfinite(now->y[i])) flags |= PB_FLAG_NON_FINITE;
+  if (stepper->state->saturated) flags |= PB_FLAG_SATURATED;
   now->flags = flags;
 }
 

@@ -18,7 +18,8 @@ enum {
   PB_FLAG_LATE = 2,        // a command acted later than the step it was for
   PB_FLAG_NON_FINITE = 4,  // an output is not finite
   PB_FLAG_OVERRUN = 8,     // real time: the step began later than one interval
-  PB_FLAG_COUNT = 4,
+  PB_FLAG_SATURATED = 16,  // an input was cut by its electronics: range or slew
+  PB_FLAG_COUNT = 5,
   PB_STEPPER_INPUTS = 32,
   PB_STEPPER_OUTPUTS = 64,
 };

@@ -13,18 +13,20 @@ void pb_analysis_clear(pb_analysis *a) {
   free(a->mode);
   free(a->agreement);
   free(a->exact);
+  if (a->early.h != a->frf.h) free(a->early.h);
   pb_frf_clear(&a->frf);
   *a = (pb_analysis){0};
 }
 
-pb_status pb_exact_responses(const pb_model *model, const pb_experiment_channels *ch,
-                             const double *hz, size_t nf, double complex **out, pb_error *err) {
+pb_status pb_exact_responses(const pb_model *model, pb_time_base base,
+                             const pb_experiment_channels *ch, const double *hz, size_t nf,
+                             double complex **out, pb_error *err) {
   size_t all = model->ny * model->nu, some = ch->outputs * ch->inputs;
   double complex *h = malloc(all * sizeof *h);
   *out = malloc((nf * some + 1) * sizeof **out);
   pb_status status = h && *out ? PB_OK : pb_fail_memory(err, "responses");
   for (size_t f = 0; f < nf && status == PB_OK; f++) {
-    status = pb_model_frf(model, PB_SAMPLED, &hz[f], 1, h, err);
+    status = pb_model_frf(model, base, &hz[f], 1, h, err);
     for (size_t k = 0; k < some && status == PB_OK; k++) {
       (*out)[f * some + k] = h[ch->output[k / ch->inputs] * model->nu + ch->input[k % ch->inputs]];
     }
@@ -35,6 +37,28 @@ pb_status pb_exact_responses(const pb_model *model, const pb_experiment_channels
     *out = NULL;
   }
   return status;
+}
+
+// Samples by which channel (o, i) is delayed.
+static size_t delay_of(const pb_model *model, pb_time_base base, const pb_experiment_channels *ch,
+                       size_t o, size_t i) {
+  size_t delay = pb_model_output_electronics(model, ch->output[o]).delay;
+  return base == PB_APPLIED ? delay : delay + pb_model_input_electronics(model, ch->input[i]).delay;
+}
+
+pb_status pb_responses_advance(const pb_model *model, pb_time_base base,
+                               const pb_experiment_channels *ch, const pb_frf *frf, pb_frf *out,
+                               pb_error *err) {
+  *out = *frf;
+  if (pb_model_delay(model) == 0) return PB_OK;
+  out->h = malloc(frf->nf * frf->ny * frf->nu * sizeof *out->h);
+  if (!out->h) return pb_fail_memory(err, "responses");
+  for (size_t k = 0; k < frf->nf * frf->ny * frf->nu; k++) {
+    size_t f = k / (frf->ny * frf->nu), o = k / frf->nu % frf->ny, i = k % frf->nu;
+    double turn = frf->frequency_hz[f] / model->sample_rate * 2 * M_PI;
+    out->h[k] = frf->h[k] * cexp(I * turn * (double)delay_of(model, base, ch, o, i));
+  }
+  return PB_OK;
 }
 
 // The largest response of output o at line f: with several inputs at once, what their orthogonality
@@ -157,7 +181,7 @@ static pb_status find_modes(pb_analysis *a, double floor, pb_error *err) {
   pb_pole_list exact = {0};
   pb_fit fit = {0};
   size_t channels = pb_fit_channels(&a->frf, channel, FIT_CHANNELS);
-  pb_status status = pb_fit_frf(&a->frf, channel, channels, &options, &fit, err);
+  pb_status status = pb_fit_frf(&a->early, channel, channels, &options, &fit, err);
   if (status == PB_OK) status = pb_exact_modes(a->model, f1, f2, &exact, err);
   if (status == PB_OK) {
     a->mode = calloc(exact.count + 1, sizeof *a->mode);
@@ -189,7 +213,7 @@ static pb_status look_closely(pb_analysis *a, pb_fit_channel at, double floor, p
   size_t count = 0;
   pb_pole_list zeros = {0};
   pb_fit fit = {0};
-  pb_status status = pb_fit_frf(&a->frf, &at, 1, &options, &fit, err);
+  pb_status status = pb_fit_frf(&a->early, &at, 1, &options, &fit, err);
   if (status == PB_OK) status = pb_fit_zeros(&fit, 0, &zeros, err);
   if (status == PB_OK) {
     status = pb_exact_zeros(a->model, row->output, row->input, f1, f2, &exact, &count, err);
@@ -242,7 +266,9 @@ static pb_status find_rows(pb_analysis *a, double floor, pb_error *err) {
     pb_channel_row *row = &a->row[a->rows++];
     row->output = a->channels.output[channel[k].output];
     row->input = a->channels.input[channel[k].input];
-    row->dc_exact = dc[row->output * a->model->nu + row->input];
+    // From the applied input, as measured: without the gain of its electronics.
+    row->dc_exact = dc[row->output * a->model->nu + row->input] /
+                    pb_model_input_electronics(a->model, row->input).gain;
     row->dc_measured = NAN;
     status = look_closely(a, channel[k], floor, row, err);
     if (status == PB_ERR_NUMERIC || status == PB_ERR_SINGULAR)
@@ -256,8 +282,10 @@ pb_status pb_analyse(const pb_model *model, const pb_experiment_channels *channe
                      double floor, pb_analysis *out, pb_error *err) {
   *out = (pb_analysis){.model = model, .channels = *channels, .frf = *frf};
   *frf = (pb_frf){0};
-  pb_status status =
-      pb_exact_responses(model, channels, out->frf.frequency_hz, out->frf.nf, &out->exact, err);
+  pb_status status = pb_exact_responses(model, PB_APPLIED, channels, out->frf.frequency_hz,
+                                        out->frf.nf, &out->exact, err);
+  if (status == PB_OK)
+    status = pb_responses_advance(model, PB_APPLIED, channels, &out->frf, &out->early, err);
   if (status == PB_OK) status = compare(out, err);
   if (status == PB_OK) status = find_modes(out, floor, err);
   if (status == PB_OK) status = find_rows(out, floor, err);

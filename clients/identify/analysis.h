@@ -39,6 +39,7 @@ typedef struct pb_analysis {
   const pb_model *model;
   pb_experiment_channels channels;
   pb_frf frf;               // measured, owned
+  pb_frf early;             // the same without the outputs' delays; only its h may be its own
   double complex *exact;    // [nf][outputs][inputs]
   pb_agreement *agreement;  // [outputs]
   pb_agreement overall;
@@ -56,9 +57,18 @@ pb_status pb_analyse(const pb_model *model, const pb_experiment_channels *channe
 
 void pb_analysis_clear(pb_analysis *analysis);
 
-// Exact sampled responses of chosen channels, [nf][outputs][inputs], owned by the caller. [init]
-pb_status pb_exact_responses(const pb_model *model, const pb_experiment_channels *channels,
-                             const double *hz, size_t nf, double complex **out, pb_error *err);
+// Exact responses of chosen channels, [nf][outputs][inputs], owned by the caller. base: PB_APPLIED
+// for responses from the inputs as applied, PB_SAMPLED for those from commands. [init]
+pb_status pb_exact_responses(const pb_model *model, pb_time_base base,
+                             const pb_experiment_channels *channels, const double *hz, size_t nf,
+                             double complex **out, pb_error *err);
+
+// *out: the measured response without the delays of the electronics that `base` includes, which no
+// fit need find. It shares the arrays of frf but for h, the caller's (free) unless it is frf's too:
+// where nothing is delayed. [init]
+pb_status pb_responses_advance(const pb_model *model, pb_time_base base,
+                               const pb_experiment_channels *channels, const pb_frf *frf,
+                               pb_frf *out, pb_error *err);
 
 // Agreement of h with exact, both [nf][ny][nu] as frf, for output o (index in the frf). [any]
 pb_agreement pb_agreement_of(const pb_frf *frf, const double complex *exact, size_t o);

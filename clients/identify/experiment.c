@@ -34,6 +34,16 @@ static pb_status check_channels(const pb_experiment *e, pb_error *err) {
   return PB_OK;
 }
 
+// Of the driven inputs' electronics.
+static size_t longest_delay(const pb_experiment *e) {
+  size_t longest = 0;
+  for (size_t i = 0; i < e->channels.inputs; i++) {
+    size_t delay = pb_model_input_electronics(e->model, e->channels.input[i]).delay;
+    if (delay > longest) longest = delay;
+  }
+  return longest;
+}
+
 static bool allocate(pb_experiment *e) {
   size_t inputs = e->channels.inputs;
   const pb_lti *k = e->feedback.controller;
@@ -42,8 +52,9 @@ static bool allocate(pb_experiment *e) {
   e->u = calloc(inputs, sizeof *e->u);
   e->y = calloc(e->channels.outputs, sizeof *e->y);
   e->w = calloc(inputs, sizeof *e->w);
-  e->history_u = calloc(inputs, sizeof *e->history_u);
-  e->history_w = calloc(inputs, sizeof *e->history_w);
+  e->remembered = PB_EXPERIMENT_HISTORY + longest_delay(e);
+  e->history_u = calloc(inputs * e->remembered, sizeof *e->history_u);
+  e->history_w = calloc(inputs * e->remembered, sizeof *e->history_w);
   e->x = calloc(states + 1, sizeof *e->x);
   e->scratch = calloc(states + 1, sizeof *e->scratch);
   e->loop_y = calloc(read + 1, sizeof *e->loop_y);
@@ -114,7 +125,7 @@ pb_status pb_experiment_begin(pb_experiment *e, pb_error *err) {
   e->started = e->previous_known = e->ending = false;
   e->gap_until = 0;
   if (e->realtime || e->round == 0)
-    memset(e->history_u, 0, e->channels.inputs * sizeof *e->history_u);
+    memset(e->history_u, 0, e->channels.inputs * e->remembered * sizeof *e->history_u);
   return PB_OK;
 }
 
@@ -132,14 +143,17 @@ static void break_record(pb_experiment *e) {
   for (size_t k = 0; k < e->welches; k++) pb_welch_break(e->welch[k]);
 }
 
-// How many steps ago the command was sent that the sample found applied: the newest that fits best.
+// How many steps late the command came that the sample found applied, behind the electronics' own
+// delay: the newest that fits best.
 static size_t applied_age(const pb_experiment *e, const pb_sample *sample) {
   size_t best = 0;
   double least = INFINITY;
   for (size_t age = 0; age < PB_EXPERIMENT_HISTORY; age++) {
     double distance = 0;
     for (size_t i = 0; i < e->channels.inputs; i++) {
-      distance += fabs(sample->input[e->channels.input[i]] - e->history_u[i][age]);
+      pb_electronics at = pb_model_input_electronics(e->model, e->channels.input[i]);
+      double command = e->history_u[i * e->remembered + age + at.delay];
+      distance += fabs(sample->input[e->channels.input[i]] - pb_electronics_steady(&at, command));
     }
     if (distance < least * (1 - 1e-9)) least = distance, best = age;
   }
@@ -149,9 +163,11 @@ static size_t applied_age(const pb_experiment *e, const pb_sample *sample) {
 // The pair of the step before: y(k−1) with what acted from then on.
 static void fill_pair(pb_experiment *e, const pb_sample *sample) {
   size_t age = e->realtime ? applied_age(e, sample) : 0;
+  bool from_command = e->feedback.controller || e->feedback.from_command;
   e->trouble.late += age > 1 || (age > 0 && !e->realtime);
   for (size_t i = 0; i < e->channels.inputs; i++) {
-    e->u[i] = e->feedback.controller ? e->history_w[i][age] : sample->input[e->channels.input[i]];
+    e->u[i] =
+        from_command ? e->history_w[i * e->remembered + age] : sample->input[e->channels.input[i]];
   }
   for (size_t o = 0; o < e->channels.outputs; o++) e->y[o] = e->previous_y[e->channels.output[o]];
 }
@@ -194,7 +210,8 @@ static void note_faults(pb_experiment *e, const pb_sample *sample) {
   for (size_t i = 0; i < sample->input_count; i++) {
     bool driven = false;
     for (size_t j = 0; j < e->channels.inputs; j++) driven = driven || e->channels.input[j] == i;
-    moved = moved || (!driven && sample->input[i] != 0);
+    double noise = 10 * pb_model_input_electronics(e->model, i).noise;
+    moved = moved || (!driven && !(fabs(sample->input[i]) <= noise));
   }
   e->trouble.disturbed += moved;
 }
@@ -225,10 +242,11 @@ static void control(pb_experiment *e, const pb_sample *sample, double *command) 
     for (size_t i = 0; i < inputs; i++) command[i] += e->feedback.sign * e->loop_u[i];
   }
   for (size_t i = 0; i < inputs; i++) {
-    memmove(e->history_u[i] + 1, e->history_u[i], (PB_EXPERIMENT_HISTORY - 1) * sizeof(double));
-    memmove(e->history_w[i] + 1, e->history_w[i], (PB_EXPERIMENT_HISTORY - 1) * sizeof(double));
-    e->history_u[i][0] = command[i];
-    e->history_w[i][0] = e->w[i];
+    double *u = e->history_u + i * e->remembered, *w = e->history_w + i * e->remembered;
+    memmove(u + 1, u, (e->remembered - 1) * sizeof *u);
+    memmove(w + 1, w, (e->remembered - 1) * sizeof *w);
+    u[0] = command[i];
+    w[0] = e->w[i];
   }
 }
 

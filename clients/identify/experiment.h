@@ -5,7 +5,8 @@
 // sample carries, with y(k−1) of the sample before, feeds the estimator, and commands
 //   u(k) = w(k) + K y(k)
 // with w the excitation and K an optional controller. Without a controller the estimate is from the
-// applied u to y; with one it is from w to y, the damped plant.
+// applied u to y, what the inputs' electronics do left out; with one it is from w to y, the damped
+// plant, from command on.
 //
 // Stages: periodic excitation takes as many as there are inputs (orthogonal, or one input at a
 // time); noise takes one, or one an input.
@@ -29,7 +30,7 @@ typedef enum pb_excitation {
 typedef struct pb_experiment_options {
   pb_excitation excitation;
   double f1, f2;          // Hz
-  double rms;             // of each input, in its unit (chirp: amplitude = √2 rms)
+  double rms;             // of each command, in its unit (chirp: amplitude = √2 rms)
   double resolution;      // Hz: one over the period or the segment
   size_t averages;        // periods, or segments, measured in one round of a stage
   double settle;          // seconds at the start of each stage that are not used
@@ -39,7 +40,7 @@ typedef struct pb_experiment_options {
   pb_window window;        // noise
   double overlap;          // noise
   pb_estimator estimator;  // noise
-  double limit;            // largest |u| that may be commanded; 0: none
+  double limit;            // largest |command|; 0: none
 } pb_experiment_options;
 
 // Channels of the experiment, as indices into the model's lists.
@@ -55,6 +56,7 @@ typedef struct pb_experiment_feedback {
                              // many as driven inputs. NULL: none
   const size_t *output;
   double sign;
+  bool from_command;  // without a controller too, the estimate is from w
 } pb_experiment_feedback;
 
 typedef struct pb_experiment pb_experiment;
@@ -73,7 +75,7 @@ typedef struct pb_experiment_trouble {
   size_t limit_input;   // by this driven input
   double limit_value;
   uint64_t gaps;       // steps not seen (real time)
-  uint64_t disturbed;  // steps at which an input that is not driven moved
+  uint64_t disturbed;  // steps at which an input that is not driven moved by more than its noise
   uint64_t flagged;    // samples with fault flags
   uint64_t late;       // samples whose input was not the newest command (real time)
   double decay;        // remove_transient: part of the change between periods that was a decay

@@ -33,12 +33,12 @@ struct pb_experiment {
   bool begun, started, previous_known, ending;
   uint64_t first_step;  // step of the round's first sample
   uint64_t previous_step;
-  uint64_t gap_until;                          // real time: pairs before this step are not used
-  double *previous_y;                          // [ny] of the model
-  double *u, *y;                               // pair for the estimator: [inputs], [outputs]
-  double *w;                                   // [inputs] excitation now
-  double (*history_u)[PB_EXPERIMENT_HISTORY];  // [inputs] commands, and their w, newest first
-  double (*history_w)[PB_EXPERIMENT_HISTORY];
+  uint64_t gap_until;             // real time: pairs before this step are not used
+  double *previous_y;             // [ny] of the model
+  double *u, *y;                  // pair for the estimator: [inputs], [outputs]
+  double *w;                      // [inputs] excitation now
+  size_t remembered;              // PB_EXPERIMENT_HISTORY and the inputs' delay
+  double *history_u, *history_w;  // [inputs][remembered] commands, and their w, newest first
   double *x, *scratch, *loop_y, *loop_u;  // of the controller
 
   FILE *save;

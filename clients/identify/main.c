@@ -103,6 +103,7 @@ static pb_status choose_settling(const identify_options *o, const pb_bench *benc
   e->remove_transient = removable;
   e->settle = removable ? pb_settling_time(&poles, rate, 4 * e->f2, 1e-2, 5)
                         : pb_settling_time(&poles, rate, e->f1, 1e-4, 120);
+  e->settle += (double)pb_model_delay(bench->model) / rate;
   if (e->excitation == PB_EXCITE_NOISE && !e->one_at_a_time) e->settle = 0;
   pb_pole_list_clear(&poles);
   return PB_OK;

@@ -54,10 +54,12 @@ double pb_settling_time(const pb_pole_list *poles, double sample_rate, double f1
   return slowest;
 }
 
-// The model with one input and one output only; shares all other arrays.
+// The model with one input and one output only, without electronics, which move no zero; shares all
+// other arrays.
 static pb_model one_channel(const pb_model *m, size_t output, size_t input, double *c, double *d) {
   pb_model one = *m;
   one.nu = one.ny = 1;
+  one.input_electronics = one.output_electronics = NULL;
   one.b = m->b + input * m->nx;
   one.bd = m->bd + input * m->nx;
   for (size_t k = 0; k < m->nx; k++) c[k] = m->c[output + k * m->ny];

@@ -17,6 +17,7 @@ static pb_status settle_open(const iff_result *r, bool removable, double *second
   double rate = r->model->sample_rate;
   *seconds = removable ? pb_settling_time(&poles, rate, 4 * r->experiment.f2, 1e-2, 5)
                        : pb_settling_time(&poles, rate, r->experiment.f1, 1e-4, 120);
+  *seconds += (double)pb_model_delay(r->model) / rate;
   pb_pole_list_clear(&poles);
   return PB_OK;
 }
@@ -33,6 +34,7 @@ static pb_status settle_closed(iff_result *r, bool removable, double *seconds, p
   }
   *seconds = removable ? fmax(above, pb_settling_time(&poles, rate, 0, 1e-2, 10))
                        : pb_settling_time(&poles, rate, 0, 1e-4, 120);
+  *seconds += (double)pb_model_delay(r->model) / rate;
   pb_pole_list_clear(&poles);
   return status;
 }
@@ -46,8 +48,9 @@ static pb_status make_experiment(iff_result *r, bool closed, pb_experiment **out
     status = closed ? settle_closed(r, removable, &e.settle, err)
                     : settle_open(r, removable, &e.settle, err);
   }
+  // Undamped and damped are compared: with electronics at the inputs both are from the command.
   pb_experiment_feedback feedback = {closed ? &r->controller_used : NULL, r->loops.output,
-                                     r->loop.sign};
+                                     r->loop.sign, r->model->input_electronics != NULL};
   if (status == PB_OK) {
     status = pb_experiment_new(r->model, &r->channels, &feedback, &e, r->bench->realtime, out, err);
   }
@@ -90,8 +93,8 @@ static pb_status evaluate(const iff_result *r, pb_experiment *experiment, bool c
   pb_status status = pb_experiment_estimate(experiment, &m->frf, err);
   if (status == PB_OK) {
     status = closed ? predict(r, m, err)
-                    : pb_exact_responses(r->model, &r->channels, m->frf.frequency_hz, m->frf.nf,
-                                         &m->expected, err);
+                    : pb_exact_responses(r->model, PB_SAMPLED, &r->channels, m->frf.frequency_hz,
+                                         m->frf.nf, &m->expected, err);
   }
   if (status != PB_OK) return status;
   compare(m);
@@ -100,7 +103,11 @@ static pb_status evaluate(const iff_result *r, pb_experiment *experiment, bool c
   pb_fit_options options = {.sample_rate = r->model->sample_rate,
                             .weight = PB_FIT_NOISE,
                             .floor = r->experiment.excitation == PB_EXCITE_NOISE ? 1e-3 : 1e-6};
-  return pb_fit_frf(&m->frf, channel, channels, &options, &m->fit, err);
+  pb_frf early;
+  status = pb_responses_advance(r->model, PB_SAMPLED, &r->channels, &m->frf, &early, err);
+  if (status == PB_OK) status = pb_fit_frf(&early, channel, channels, &options, &m->fit, err);
+  if (early.h != m->frf.h) free(early.h);
+  return status;
 }
 
 // The fitted pole nearest to a predicted one, unless it is too far to be meant: a mode that the

@@ -1,6 +1,9 @@
 // plantbus-model export: the state space, for other programs.
 //
 //   ẋ = A x + B u, y = C x + D u;  x(k+1) = A_d x(k) + B_d u(k), y(k) = C x(k) + D u(k−1)
+//
+// u is what acts and y what the plant does; the electronics between command and u, and between y
+// and the measured value, stand beside as numbers a signal.
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -28,6 +31,10 @@ static double *dense(const pb_model *m, const double *blocks) {
   return full;
 }
 
+static void electronics_mat(void *context, const char *name, const double *value, size_t count) {
+  pb_matfile_real(context, name, count, 1, value);
+}
+
 static pb_status export_mat(const export *e, pb_error *err) {
   const pb_model *m = e->model;
   double *a = dense(m, m->a), *ad = dense(m, m->ad);
@@ -49,6 +56,7 @@ static pb_status export_mat(const export *e, pb_error *err) {
     pb_matfile_names(mat, "input_units", e->ch.input_unit, m->nu);
     pb_matfile_names(mat, "outputs", e->ch.output_name, m->ny);
     pb_matfile_names(mat, "output_units", e->ch.output_unit, m->ny);
+    electronics_each(m, electronics_mat, mat);
     status = pb_matfile_close(mat, err);
   }
   free(a);
@@ -95,6 +103,7 @@ static void export_json(pb_jsonout *json, const void *context) {
   rows_json(json, "D", m->d, m->ny, m->nu);
   blocks_json(json, "A_d_blocks", m, m->ad);
   rows_json(json, "B_d", m->bd, m->nx, m->nu);
+  electronics_json(json, m);
   pb_jsonout_object_end(json);
 }
 
@@ -126,6 +135,10 @@ static void signals_csv(pb_csv *csv, const char *item, const pb_signal *signal, 
   }
 }
 
+static void electronics_csv(void *context, const char *name, const double *value, size_t count) {
+  matrix_csv(context, name, value, count, 1, 0);
+}
+
 static pb_status export_csv(const export *e, pb_error *err) {
   const pb_model *m = e->model;
   pb_csv csv;
@@ -148,6 +161,7 @@ static pb_status export_csv(const export *e, pb_error *err) {
   }
   matrix_csv(&csv, "C", m->c, m->ny, m->nx, 0);
   matrix_csv(&csv, "D", m->d, m->ny, m->nu, 0);
+  electronics_each(m, electronics_csv, &csv);
   return pb_csv_close(&csv, err);
 }
 

@@ -1,4 +1,4 @@
-// plantbus-model frf: exact frequency responses.
+// plantbus-model frf: exact frequency responses from command to measured output.
 #include <complex.h>
 #include <math.h>
 #include <stdio.h>

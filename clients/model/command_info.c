@@ -1,4 +1,5 @@
-// plantbus-model info: what the plant is, its signals, first modes and static gains.
+// plantbus-model info: what the plant is, its signals and their electronics, first modes and static
+// gains from command to output.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -26,6 +27,7 @@ static void info_json(pb_jsonout *json, const void *context) {
   emit_channels_json(json, i->ch);
   pb_jsonout_texts(json, "input_units", i->ch->input_unit, m->nu);
   pb_jsonout_texts(json, "output_units", i->ch->output_unit, m->ny);
+  electronics_json(json, m);
   pb_jsonout_array(json, "dc_gain");
   for (size_t o = 0; o < m->ny; o++) pb_jsonout_numbers(json, NULL, i->gain + o * m->nu, m->nu);
   pb_jsonout_array_end(json);
@@ -88,6 +90,7 @@ int command_info(const tool *t, const pb_model *model) {
   info i = {model, &ch, gain};
   if (!status && wants_table(t)) {
     print_overview(model);
+    status = electronics_print(model, &err);
     for (size_t k = 0; !status && k < model->nu; k += GAIN_COLUMNS) {
       size_t end = k + GAIN_COLUMNS < model->nu ? k + GAIN_COLUMNS : model->nu;
       if (k) putchar('\n');

@@ -1,5 +1,6 @@
-// plantbus-model step: the response of the sampled plant to a constant input, by the very kernel
-// that the daemon steps with. Row k: the outputs after that many steps.
+// plantbus-model step: the response of the sampled plant to a constant command, by the very kernel
+// that the daemon steps with: the outputs as measured, all that the electronics do (noise too) in
+// them. Row k: the outputs after that many steps.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -72,6 +72,23 @@ void channels_free(channels *ch);
 // "m/V", "(m/s^2)/N"; in text of the given size.
 void channels_unit(const channels *ch, size_t output, size_t input, char *text, size_t size);
 
+// ---- signal electronics (electronics.c) ---------------------------------------------------------
+
+enum { PB_ELECTRONICS_SIGNALS = 64 };  // of one list: a plant file has no more
+
+bool electronics_any(const pb_model *model);  // whether any signal has some
+
+// Both print nothing for a model without: a table of the signals whose electronics change
+// something; the member "electronics" with the lists "inputs" and "outputs".
+pb_status electronics_print(const pb_model *model, pb_error *err);
+void electronics_json(pb_jsonout *json, const pb_model *model);
+
+// Hands over each property of all inputs, then of all outputs, under the names of the exports
+// ("input_gain", …, "output_delay", …); nothing for a model without.
+typedef void electronics_function(void *context, const char *name, const double *value,
+                                  size_t count);
+void electronics_each(const pb_model *model, electronics_function *take, void *context);
+
 // ---- results (emit.c) ---------------------------------------------------------------------------
 
 // A column of numbers: its JSON key and MATLAB name, heading, unit, digits in a table.
