@@ -10,6 +10,7 @@
 extern char **environ;
 
 #define BENCH PB_CONFIG "/plants/apa300ml-bench.json"
+#define ELECTRONICS PB_CONFIG "/plants/apa300ml-bench-electronics.json"
 #define HEXAPOD PB_CONFIG "/plants/nano-hexapod.json"
 
 enum { MOST_ARGUMENTS = 24 };
@@ -173,6 +174,38 @@ static void test_info(void **state) {
     }
   }
   cJSON_Delete(tree);
+}
+
+// Electronics are told and are in what is computed; a plant without them has no such member.
+static void test_electronics(void **state) {
+  (void)state;
+  cJSON *tree = run_json("info " ELECTRONICS " --json"), *plain = run_json("info " BENCH " --json");
+  const cJSON *lists = member(tree, "electronics");
+  const cJSON *va = cJSON_GetArrayItem(member(lists, "inputs"), 0);
+  const cJSON *vs = cJSON_GetArrayItem(member(lists, "outputs"), 0);
+  assert_string_equal(member(va, "name")->valuestring, "Va");
+  assert_true(member(va, "gain")->valuedouble == 20 && at(member(va, "saturation"), 1) == 150);
+  assert_int_equal(member(vs, "delay")->valueint, 1);
+  assert_null(cJSON_GetObjectItem(plain, "electronics"));
+  for (int o = 0; o < 2; o++)
+    ASSERT_RELATIVE(at(cJSON_GetArrayItem(member(tree, "dc_gain"), o), 0),
+                    20 * at(cJSON_GetArrayItem(member(plain, "dc_gain"), o), 0), 1e-14);
+  cJSON_Delete(tree), cJSON_Delete(plain);
+  tree = run_json("step " ELECTRONICS " --json --steps 3 --input Va --output Vs");
+  const cJSON *rows = member(tree, "output");
+  assert_true(fabs(at(cJSON_GetArrayItem(rows, 0), 0)) < 0.002);  // a sample late, but for noise
+  assert_true(fabs(at(cJSON_GetArrayItem(rows, 1), 0)) > 0.1);
+  cJSON_Delete(tree);
+  assert_int_equal(run("export " ELECTRONICS " -o %s", path_of("result.mat")), 0);
+  mat_t *mat = Mat_Open(path_of("result.mat"), MAT_ACC_RDONLY);
+  assert_non_null(mat);
+  matvar_t *gain = Mat_VarRead(mat, "input_gain"), *delay = Mat_VarRead(mat, "output_delay");
+  assert_true(gain && delay);
+  assert_true(((double *)gain->data)[0] == 20 && ((double *)gain->data)[1] == 1);
+  assert_true(((double *)delay->data)[0] == 1 && ((double *)delay->data)[1] == 0);
+  Mat_VarFree(gain), Mat_VarFree(delay);
+  Mat_Close(mat);
+  unlink(path_of("result.mat"));
 }
 
 static void test_modes_poles_zeros(void **state) {
@@ -403,6 +436,7 @@ static void test_tables(void **state) {
       {"frf " BENCH " --frequencies 10 --input Va --output y", "magnitude [m/V]"},
       {"step " BENCH " --steps 2", "Va = 1 V from step 0"},
       {"info " HEXAPOD, "nano-hexapod"},
+      {"info " ELECTRONICS, "-20 … 150"},
   };
   for (size_t k = 0; k < sizeof table / sizeof *table; k++) {
     must_run(table[k].line);
@@ -491,12 +525,19 @@ static void test_failures(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_info),     cmocka_unit_test(test_modes_poles_zeros),
-      cmocka_unit_test(test_poles),    cmocka_unit_test(test_frf),
-      cmocka_unit_test(test_frf_grid), cmocka_unit_test(test_step),
-      cmocka_unit_test(test_csv),      cmocka_unit_test(test_export),
-      cmocka_unit_test(test_formats),  cmocka_unit_test(test_tables),
-      cmocka_unit_test(test_hexapod),  cmocka_unit_test(test_usage_errors),
+      cmocka_unit_test(test_info),
+      cmocka_unit_test(test_electronics),
+      cmocka_unit_test(test_modes_poles_zeros),
+      cmocka_unit_test(test_poles),
+      cmocka_unit_test(test_frf),
+      cmocka_unit_test(test_frf_grid),
+      cmocka_unit_test(test_step),
+      cmocka_unit_test(test_csv),
+      cmocka_unit_test(test_export),
+      cmocka_unit_test(test_formats),
+      cmocka_unit_test(test_tables),
+      cmocka_unit_test(test_hexapod),
+      cmocka_unit_test(test_usage_errors),
       cmocka_unit_test(test_failures),
   };
   return cmocka_run_group_tests(tests, make_folder, remove_folder);

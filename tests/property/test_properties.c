@@ -7,6 +7,7 @@
 #include "base/json.h"
 #include "base/lapack.h"
 #include "base/text.h"
+#include "control/lti_ops.h"
 #include "model/model.h"
 
 static const char *const shipped[] = {"apa300ml-bench", "nano-hexapod", "nano-hexapod-1dof"};
@@ -38,6 +39,20 @@ static built build_shipped(size_t i) {
   char *text = shipped_text(i);
   built b = build_text(text);
   free(text);
+  return b;
+}
+
+// The hexapod with electronics for its signals.
+static built build_electronics(const char *electronics) {
+  char patch[1024], *text = shipped_text(1), *with = NULL;
+  snprintf(patch, sizeof patch, "{\"template\": {\"electronics\": %s}}", electronics);
+  cJSON *file = cJSON_Parse(text), *change = cJSON_Parse(patch);
+  assert_non_null(change);
+  cJSON *merged = pb_json_merge(file, change);
+  REQUIRE(pb_json_print(merged, &with, &err));
+  built b = build_text(with);
+  free(text), free(with);
+  cJSON_Delete(file), cJSON_Delete(change), cJSON_Delete(merged);
   return b;
 }
 
@@ -179,6 +194,136 @@ static void test_snapshots_continue_bit_for_bit(void **state) {
   dispose(&b);
 }
 
+// The same through delay lines, generators, slew and saturation, at a point where all of them are
+// at work; and two states that are given the same commands never differ.
+static void test_snapshots_with_electronics(void **state) {
+  (void)state;
+  built b = build_electronics(
+      "{\"actuators\": {\"gain\": 20, \"delay\": 7, \"noise\": 0.1, \"quantisation\": 0.01, "
+      "\"saturation\": [-20, 150], \"slew\": 40000}, \"sensors\": {\"delay\": 3, \"noise\": "
+      "0.01, \"quantisation\": 0.001}, \"metrology\": {\"delay\": 11, \"noise\": 1e-9}}");
+  size_t bytes = pb_state_bytes(b.model);
+  pb_state *s = pb_state_new(b.model), *copy = malloc(bytes), *twin = pb_state_new(b.model);
+  double u[12] = {0}, y[18], other[18];
+  uint64_t cut = 0;
+  for (int k = 0; k < 101; k++) {
+    for (int i = 0; i < 6; i++) u[i] = 4 * sin(0.3 * k + i);
+    pb_step_advance(b.model, s, u);
+    pb_step_advance(b.model, twin, u);
+    cut |= s->saturated;
+  }
+  assert_int_equal(cut, 63);
+  assert_memory_equal(s, twin, bytes);
+  memcpy(copy, s, bytes);
+  for (int k = 0; k < 100; k++) {
+    for (int i = 0; i < 6; i++) u[i] = 4 * cos(0.2 * k + i);
+    pb_step_advance(b.model, s, u);
+  }
+  for (int k = 0; k < 100; k++) {
+    for (int i = 0; i < 6; i++) u[i] = 4 * cos(0.2 * k + i);
+    pb_step_advance(b.model, copy, u);
+  }
+  pb_step_output(b.model, s, y), pb_step_output(b.model, copy, other);
+  assert_memory_equal(y, other, sizeof y);
+  assert_memory_equal(s, copy, bytes);
+  free(s), free(copy), free(twin);
+  dispose(&b);
+}
+
+// The response that is predicted with gains and delays is the transform of the stepped impulse
+// response; the bench is damped well, so that it ends soon and its sum keeps its digits.
+static void test_sampled_response_with_electronics(void **state) {
+  (void)state;
+  enum { STEPS = 20000, LINES = 4 };
+  static const double hz[LINES] = {20, 93.2, 700, 3100};
+  char *text = shipped_text(0), *damped = NULL;
+  cJSON *file = cJSON_Parse(text);
+  cJSON *patch = cJSON_Parse("{\"models\": {\"apa300ml\": {\"c_1\": 3000, \"c_a\": 900}}}");
+  cJSON *merged = pb_json_merge(file, patch);
+  REQUIRE(pb_json_print(merged, &damped, &err));
+  built b = build_text(damped);
+  pb_electronics in[2] = {pb_electronics_none(), pb_electronics_none()}, out[2] = {in[0], in[0]};
+  in[0].gain = -20, in[0].delay = 4, out[0].delay = 3, out[1].delay = 1;
+  REQUIRE(pb_electronics_attach(b.model, in, out, &err));
+  double complex sum[LINES][2] = {{0}}, h[LINES * 4];
+  pb_state *s = pb_state_new(b.model);
+  REQUIRE(pb_model_frf(b.model, PB_SAMPLED, hz, LINES, h, &err));
+  for (int k = 0; k < STEPS; k++) {
+    double u[2] = {k == 0, 0}, y[2];
+    pb_step_output(b.model, s, y);
+    pb_step_advance(b.model, s, u);
+    for (int f = 0; f < LINES; f++) {
+      double complex turn = cexp(-I * 2 * M_PI * hz[f] * k / b.model->sample_rate);
+      for (int o = 0; o < 2; o++) sum[f][o] += y[o] * turn;
+    }
+  }
+  for (int f = 0; f < LINES; f++)
+    for (int o = 0; o < 2; o++)
+      ASSERT_NEAR(cabs(sum[f][o] - h[f * 4 + o * 2]), 0, 1e-10 * cabs(h[f * 4 + o * 2]));
+  free(s), free(text), free(damped);
+  cJSON_Delete(file), cJSON_Delete(patch), cJSON_Delete(merged);
+  dispose(&b);
+}
+
+// As one dense system, delays as states, the plant steps the same.
+static void test_dense_system_with_electronics(void **state) {
+  (void)state;
+  built b = build_electronics(
+      "{\"actuators\": {\"gain\": 20, \"delay\": 2}, \"sensors\": {\"delay\": 1}, "
+      "\"metrology\": {\"delay\": 3}}");
+  pb_lti lti;
+  REQUIRE(pb_lti_from_model(b.model, PB_SAMPLED, &lti, &err));
+  double *x = calloc(lti.nx, sizeof *x), *scratch = calloc(lti.nx, sizeof *scratch);
+  pb_state *s = pb_state_new(b.model);
+  double u[12], y[18], z[18], peak[18] = {0};
+  for (int k = 0; k < 500; k++) {
+    for (int i = 0; i < 12; i++) u[i] = sin(0.01 * k * (i + 1));
+    pb_step_output(b.model, s, y);
+    pb_step_advance(b.model, s, u);
+    pb_lti_step(&lti, x, scratch, u, z);
+    for (int o = 0; o < 18; o++) {
+      peak[o] = fmax(peak[o], fabs(y[o]));
+      ASSERT_NEAR(z[o], y[o], 1e-12 * peak[o]);
+    }
+  }
+  free(x), free(scratch), free(s);
+  pb_lti_free(&lti);
+  dispose(&b);
+}
+
+// A plant without electronics steps as the recurrence says, operation by operation.
+static void test_plain_steps_are_the_recurrence(void **state) {
+  (void)state;
+  for (size_t i = 0; i < SHIPPED; i++) {
+    built b = build_shipped(i);
+    const pb_model *m = b.model;
+    pb_state *s = pb_state_new(m);
+    double *x = calloc(m->nx, sizeof *x), u[PB_MAX_INPUTS], y[PB_MAX_OUTPUTS], z[PB_MAX_OUTPUTS];
+    assert_int_equal(m->pairs, m->blocks);
+    assert_int_equal(pb_state_bytes(m), sizeof(pb_state) + (m->nx + m->nu) * sizeof(double));
+    for (int k = 0; k < 300; k++) {
+      for (size_t c = 0; c < m->nu; c++) u[c] = sin(0.1 * k + (double)c);
+      pb_step_advance(m, s, u);
+      for (size_t p = 0; p < m->pairs; p++) {
+        const double *a = m->ad + 4 * p, x0 = x[2 * p], x1 = x[2 * p + 1];
+        x[2 * p] = a[0] * x0 + a[2] * x1, x[2 * p + 1] = a[1] * x0 + a[3] * x1;
+      }
+      for (size_t c = 0; c < m->nu; c++)
+        for (size_t r = 0; r < m->nx; r++) x[r] += m->bd[r + c * m->nx] * u[c];
+      memset(z, 0, sizeof z);
+      for (size_t r = 0; r < m->nx; r++)
+        for (size_t o = 0; o < m->ny; o++) z[o] += m->c[o + r * m->ny] * x[r];
+      for (size_t c = 0; c < m->nu; c++)
+        for (size_t o = 0; o < m->ny; o++) z[o] += m->d[o + c * m->ny] * u[c];
+      pb_step_output(m, s, y);
+      assert_memory_equal(s->data, x, m->nx * sizeof *x);
+      assert_memory_equal(y, z, m->ny * sizeof *y);
+    }
+    free(s), free(x);
+    dispose(&b);
+  }
+}
+
 // A free chain of two beams and a mass on a bushing: six rigid-body modes, whatever its pose, and
 // the flexible modes do not depend on the pose.
 static void test_six_rigid_modes_in_any_pose(void **state) {
@@ -227,6 +372,10 @@ int main(void) {
       cmocka_unit_test(test_reciprocity_and_passivity),
       cmocka_unit_test(test_steps_compose),
       cmocka_unit_test(test_snapshots_continue_bit_for_bit),
+      cmocka_unit_test(test_snapshots_with_electronics),
+      cmocka_unit_test(test_sampled_response_with_electronics),
+      cmocka_unit_test(test_dense_system_with_electronics),
+      cmocka_unit_test(test_plain_steps_are_the_recurrence),
       cmocka_unit_test(test_six_rigid_modes_in_any_pose),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

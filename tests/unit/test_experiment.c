@@ -186,12 +186,11 @@ static void test_late_bus(void **state) {
 }
 
 // With feedback the estimate is the closed loop from w, whatever the delay of the bus.
-static void check_closed_loop(unsigned delay) {
-  pb_model *m = plant();
+static void check_closed_loop(pb_model *m, double gain, unsigned delay) {
   pb_lti controller;
-  pb_iff iff = pb_iff_default(60);
+  pb_iff iff = pb_iff_default(gain);
   assert_int_equal(pb_iff_discrete(&iff, 2, RATE, &controller, NULL), PB_OK);
-  pb_experiment_feedback feedback = {&controller, both, 1};
+  pb_experiment_feedback feedback = {&controller, both, 1, false};
   pb_experiment_options options = standard(PB_EXCITE_MULTISINE);
   options.settle = 6;  // the controller's own poles are slow
   pb_experiment *e = make(m, &feedback, &options, delay > 0);
@@ -214,8 +213,82 @@ static void check_closed_loop(unsigned delay) {
 
 static void test_closed_loop(void **state) {
   (void)state;
-  check_closed_loop(0);
-  check_closed_loop(1);
+  check_closed_loop(plant(), 60, 0);
+  check_closed_loop(plant(), 60, 1);
+}
+
+// A plant whose voltages pass through an amplifier and late electronics, and whose outputs come
+// late.
+static pb_model *plant_with_electronics(uint32_t delay) {
+  pb_model *m = plant();
+  pb_electronics in[2] = {pb_electronics_none(), pb_electronics_none()};
+  pb_electronics out[3] = {in[0], in[0], in[0]};
+  in[0].gain = 20, in[0].delay = delay;
+  in[1].gain = 3, in[1].delay = 1, in[1].quantisation = 1e-9;
+  out[0].delay = 1, out[1].delay = 2;
+  assert_int_equal(pb_electronics_attach(m, in, out, NULL), PB_OK);
+  return m;
+}
+
+// One experiment on it; the estimate against the response of that base.
+static void check_electronics(pb_experiment_feedback *feedback, unsigned delay, pb_time_base base) {
+  pb_model *m = plant_with_electronics(12);
+  pb_experiment_options options = standard(PB_EXCITE_MULTISINE);
+  pb_session *session = attach(m, (fake_session_options){.delay = delay}, 2);
+  pb_experiment *e = make(m, feedback, &options, delay > 0);
+  pb_frf frf;
+  assert_int_equal(pb_experiment_run(e, session, NULL, NULL, NULL), PB_OK);
+  assert_int_equal(pb_experiment_estimate(e, &frf, NULL), PB_OK);
+  double complex *h = malloc(frf.nf * 6 * sizeof *h);
+  assert_int_equal(pb_model_frf(m, base, frf.frequency_hz, frf.nf, h, NULL), PB_OK);
+  double error = largest_error(&frf, h);
+  if (!(error < 1e-5)) fail_msg("delay %u, base %d: error %g", delay, (int)base, error);
+  assert_int_equal(pb_experiment_trouble_of(e)->late, 0);
+  free(h);
+  pb_frf_clear(&frf);
+  pb_experiment_free(e);
+  fake_session_free(session);
+  pb_model_free(m);
+}
+
+// The estimate is from the applied inputs, on request from the commands, on a prompt bus and on a
+// late one whose lateness is told from the electronics' delay.
+static void test_electronics(void **state) {
+  (void)state;
+  pb_experiment_feedback from_command = {.from_command = true};
+  check_electronics(NULL, 0, PB_APPLIED);
+  check_electronics(NULL, 1, PB_APPLIED);
+  check_electronics(&from_command, 0, PB_SAMPLED);
+  check_electronics(&from_command, 1, PB_SAMPLED);
+  check_closed_loop(plant_with_electronics(1), 2, 0);
+  check_closed_loop(plant_with_electronics(1), 2, 1);
+}
+
+// Noise of an input that nobody drives is no disturbance; a change by another client is.
+static void test_undriven_noise(void **state) {
+  (void)state;
+  pb_model *m = plant();
+  pb_electronics in[2] = {pb_electronics_none(), pb_electronics_none()};
+  in[1].noise = 1e-3;
+  assert_int_equal(pb_electronics_attach(m, in, NULL, NULL), PB_OK);
+  const pb_experiment_channels one = {both, all, 1, 3};
+  pb_experiment_options options = standard(PB_EXCITE_MULTISINE);
+  pb_experiment *e;
+  assert_int_equal(pb_experiment_new(m, &one, NULL, &options, false, &e, NULL), PB_OK);
+  pb_session *session = attach(m, (fake_session_options){0}, 1);
+  assert_int_equal(pb_experiment_run(e, session, NULL, NULL, NULL), PB_OK);
+  assert_int_equal(pb_experiment_trouble_of(e)->disturbed, 0);
+  pb_experiment_free(e);
+  fake_session_free(session);
+  assert_int_equal(pb_experiment_new(m, &one, NULL, &options, false, &e, NULL), PB_OK);
+  assert_int_equal(pb_experiment_begin(e, NULL), PB_OK);
+  const double u[2] = {0, 0.1}, y[3] = {0};
+  double command[2];
+  const pb_sample sample = {.input_count = 2, .output_count = 3, .input = u, .output = y};
+  assert_true(pb_experiment_on_sample(e, &sample, command));
+  assert_int_equal(pb_experiment_trouble_of(e)->disturbed, 1);
+  pb_experiment_free(e);
+  pb_model_free(m);
 }
 
 static void test_divergence(void **state) {
@@ -224,7 +297,7 @@ static void test_divergence(void **state) {
   pb_lti controller;
   pb_iff iff = pb_iff_default(-300);  // drives instead of damping
   assert_int_equal(pb_iff_discrete(&iff, 2, RATE, &controller, NULL), PB_OK);
-  pb_experiment_feedback feedback = {&controller, both, 1};
+  pb_experiment_feedback feedback = {&controller, both, 1, false};
   pb_experiment_options options = standard(PB_EXCITE_MULTISINE);
   options.limit = 50;
   pb_experiment *e = make(m, &feedback, &options, false);
@@ -306,6 +379,8 @@ int main(void) {
       cmocka_unit_test(test_noise),
       cmocka_unit_test(test_late_bus),
       cmocka_unit_test(test_closed_loop),
+      cmocka_unit_test(test_electronics),
+      cmocka_unit_test(test_undriven_noise),
       cmocka_unit_test(test_divergence),
       cmocka_unit_test(test_same_bytes),
       cmocka_unit_test(test_refusals),

@@ -150,6 +150,28 @@ static void test_poles_large(void **state) {
   pb_model_free(m);
 }
 
+// Gains and delays of the electronics, also of a channel outside the loop, in what the iteration on
+// the whole plant solves.
+static void test_poles_large_with_electronics(void **state) {
+  (void)state;
+  pb_model *m = large_plant();
+  pb_electronics in[NU], out[NY];
+  for (size_t i = 0; i < NU; i++) in[i] = pb_electronics_none();
+  for (size_t o = 0; o < NY; o++) out[o] = pb_electronics_none();
+  in[0].gain = 4, in[0].delay = 2, in[1].gain = 0.5;
+  out[0].delay = 1, out[3].delay = 5;
+  assert_int_equal(pb_electronics_attach(m, in, out, NULL), PB_OK);
+  pb_lti controller;
+  pb_loop loop = make_loop(m, &controller, 1);
+  pb_loop_solver *solver;
+  assert_int_equal(pb_loop_solver_new(&loop, &solver, NULL), PB_OK);
+  static const double gain[] = {0, 0.1, 10, 100};
+  for (size_t k = 0; k < 4; k++) check_poles(solver, &loop, gain[k], 600);
+  pb_loop_solver_free(solver);
+  pb_lti_free(&controller);
+  pb_model_free(m);
+}
+
 static void test_stability(void **state) {
   (void)state;
   pb_model *m = large_plant();
@@ -271,9 +293,9 @@ static void test_refusals(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_frf_dense),   cmocka_unit_test(test_closed_steps),
-      cmocka_unit_test(test_poles_large), cmocka_unit_test(test_stability),
-      cmocka_unit_test(test_best_gain),   cmocka_unit_test(test_rootlocus),
-      cmocka_unit_test(test_refusals),
+      cmocka_unit_test(test_poles_large), cmocka_unit_test(test_poles_large_with_electronics),
+      cmocka_unit_test(test_stability),   cmocka_unit_test(test_best_gain),
+      cmocka_unit_test(test_rootlocus),   cmocka_unit_test(test_refusals),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

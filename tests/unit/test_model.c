@@ -309,7 +309,7 @@ static void test_pack(void **state) {
   assert_memory_equal(copy->bd, m->bd, m->nx * m->nu * sizeof(double));
   assert_string_equal(copy->output[3].name, m->output[3].name);
   pb_model_free(copy);
-  for (size_t i = 0; i < 9; i++) {  // a header that lies is refused
+  for (size_t i = 0; i < 11; i++) {  // a header that lies is refused
     double kept = data[i];
     pb_error err = {0};
     data[i] = i < 3 ? -1 : kept + 1;

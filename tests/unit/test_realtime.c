@@ -171,10 +171,38 @@ static void a_slow_plant_stops_at_once(void **state) {
   assert_int_equal(b->stepper.now.step, 0);
 }
 
+// What the electronics cut is flagged; the record carries the input as it acts, and the outputs as
+// measured.
+static void a_saturated_step_is_flagged(void **state) {
+  (void)state;
+  pb_model *model = NULL;
+  pb_stepper stepper;
+  pb_error err = {PB_OK, "", ""};
+  const double calm[2] = {0.25, 0.0}, wild[2] = {100.0, 0.0};
+  double y[2];
+  if (pb_model_load(PB_CONFIG "/plants/apa300ml-bench-electronics.json", NULL, &model, &err))
+    fail_msg("%s", err.message);
+  assert_int_equal(pb_stepper_init(&stepper, model, &err), PB_OK);
+  assert_int_equal(stepper.now.flags, 0);
+  pb_stepper_step(&stepper, calm, PB_FLAG_HELD);
+  assert_int_equal(stepper.now.flags, PB_FLAG_HELD);
+  assert_true(stepper.now.u[0] > 4.99 && stepper.now.u[0] < 5.01);
+  for (int k = 0; k < 10; k++) pb_stepper_step(&stepper, wild, 0);
+  assert_int_equal(stepper.now.flags, PB_FLAG_SATURATED);
+  assert_true(stepper.now.u[0] == 150.0);
+  pb_step_output(model, stepper.state, y);
+  assert_memory_equal(stepper.now.y, y, sizeof y);
+  pb_stepper_restart(&stepper, NULL, 2);
+  assert_int_equal(stepper.now.flags, 0);
+  pb_stepper_free(&stepper);
+  pb_model_free(model);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_ring_loses_and_reorders_nothing),
       cmocka_unit_test(a_full_ring_refuses),
+      cmocka_unit_test(a_saturated_step_is_flagged),
       cmocka_unit_test_setup_teardown(records_equal_steps_by_hand, bench_open, bench_close),
       cmocka_unit_test_setup_teardown(late_inputs_act_and_are_counted, bench_open, bench_close),
       cmocka_unit_test_setup_teardown(a_slow_plant_stops_at_once, bench_open, bench_close),
