@@ -423,6 +423,8 @@ static void test_time_bases(void **state) {
         ASSERT_NEAR(cabs(h[2 * o + i] - expected), 0, 1e-12 * cabs(expected));
       }
   }
+  assert_int_equal(pb_model_delay(m), 5);
+  assert_int_equal(pb_model_delay(plain), 0);
   double with[4], without[4];
   REQUIRE(pb_model_dc(m, with, &err));
   REQUIRE(pb_model_dc(plain, without, &err));

@@ -9,6 +9,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "analysis.h"
 #include "control/iff.h"
 #include "control/loop.h"
 #include "experiment.h"
@@ -225,7 +226,7 @@ static pb_model *plant_with_electronics(uint32_t delay) {
   pb_electronics out[3] = {in[0], in[0], in[0]};
   in[0].gain = 20, in[0].delay = delay;
   in[1].gain = 3, in[1].delay = 1, in[1].quantisation = 1e-9;
-  out[0].delay = 1, out[1].delay = 2;
+  out[0].delay = 1, out[1].delay = 60;
   assert_int_equal(pb_electronics_attach(m, in, out, NULL), PB_OK);
   return m;
 }
@@ -262,6 +263,38 @@ static void test_electronics(void **state) {
   check_electronics(&from_command, 1, PB_SAMPLED);
   check_closed_loop(plant_with_electronics(1), 2, 0);
   check_closed_loop(plant_with_electronics(1), 2, 1);
+}
+
+// Fits do not spend poles on known delays, and static gains are those from the applied inputs.
+static void test_analysis_with_electronics(void **state) {
+  (void)state;
+  pb_model *m = plant_with_electronics(12);
+  pb_experiment_options options = standard(PB_EXCITE_MULTISINE);
+  pb_session *session = attach(m, (fake_session_options){0}, 2);
+  pb_experiment *e = make(m, NULL, &options, false);
+  pb_frf frf;
+  pb_analysis a;
+  pb_error err = {0};
+  assert_int_equal(pb_experiment_run(e, session, NULL, NULL, NULL), PB_OK);
+  assert_int_equal(pb_experiment_estimate(e, &frf, NULL), PB_OK);
+  if (pb_analyse(m, &channels, &frf, 1e-6, &a, &err) != PB_OK) fail_msg("%s", err.message);
+  assert_true(a.overall.magnitude_percent < 0.01 && a.overall.phase_degree < 0.01);
+  assert_int_equal(a.modes, 3);
+  for (size_t k = 0; k < a.modes; k++) {
+    const pb_mode_row *row = &a.mode[k];
+    assert_true(fabs(row->measured.hz - row->exact.hz) < 1e-5 * row->exact.hz);
+    assert_true(fabs(row->measured.damping - row->exact.damping) < 1e-3 * row->exact.damping);
+  }
+  assert_int_equal(a.rows, 6);
+  for (size_t k = 0; k < a.rows; k++) {
+    double error = fabs(a.row[k].dc_measured - a.row[k].dc_exact);
+    if (!(error < 1e-3 * fabs(a.row[k].dc_exact) + 1e-6))
+      fail_msg("row %zu: %g, not %g", k, a.row[k].dc_measured, a.row[k].dc_exact);
+  }
+  pb_analysis_clear(&a);
+  pb_experiment_free(e);
+  fake_session_free(session);
+  pb_model_free(m);
 }
 
 // Noise of an input that nobody drives is no disturbance; a change by another client is.
@@ -380,6 +413,7 @@ int main(void) {
       cmocka_unit_test(test_late_bus),
       cmocka_unit_test(test_closed_loop),
       cmocka_unit_test(test_electronics),
+      cmocka_unit_test(test_analysis_with_electronics),
       cmocka_unit_test(test_undriven_noise),
       cmocka_unit_test(test_divergence),
       cmocka_unit_test(test_same_bytes),
