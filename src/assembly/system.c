@@ -2,12 +2,50 @@
 #include "assembly/system.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 #include "assembly/eliminate.h"
 #include "assembly/stack.h"
 
-pb_status pb_system_assemble(const pb_plant *plant, pb_warnings *warnings, pb_system **out,
-                             pb_error *err) {
+// rows × cols in the top left of a zeroed rows × cols array, plus more; a is replaced.
+static bool widen(double **a, size_t rows, size_t cols, size_t more_rows, size_t more_cols) {
+  const size_t ld = rows + more_rows;
+  double *wide = calloc(ld * (cols + more_cols) + 1, sizeof *wide);
+  if (!wide) return false;
+  for (size_t j = 0; j < cols; j++) memcpy(wide + j * ld, *a + j * rows, rows * sizeof *wide);
+  free(*a);
+  *a = wide;
+  return true;
+}
+
+// f = [F I I], Y_0 = [Y_0; I; 0], Y_1 = [Y_1; 0; I]; y is stored transposed.
+static pb_status extend(pb_stack_equations *s, pb_error *err) {
+  const size_t n = s->n, nu = s->nu, ny = s->ny;
+  bool ok = widen(&s->f, n, nu, 0, 2 * n) && widen(&s->d, ny, nu, 2 * n, 2 * n);
+  for (int i = 0; i < 3 && ok; i++) ok = widen(&s->y[i], n, ny, 0, 2 * n);
+  if (!ok) return pb_fail_memory(err, "/components");
+  for (size_t i = 0; i < n; i++) {
+    s->f[i + (nu + i) * n] = s->f[i + (nu + n + i) * n] = 1.0;
+    s->y[0][i + (ny + i) * n] = s->y[1][i + (ny + n + i) * n] = 1.0;
+  }
+  s->nu += 2 * n;
+  s->ny += 2 * n;
+  return PB_OK;
+}
+
+static pb_status stack_keep(const pb_stack_equations *s, pb_system_stack *kept, pb_error *err) {
+  const size_t bytes = s->n * s->n * sizeof(double);
+  kept->m = malloc(bytes);
+  kept->k = malloc(bytes);
+  if (!kept->m || !kept->k) return pb_fail_memory(err, "/components");
+  memcpy(kept->m, s->m, bytes);
+  memcpy(kept->k, s->k, bytes);
+  return PB_OK;
+}
+
+// With `kept` the equations are extended, and what they were is kept.
+static pb_status assemble(const pb_plant *plant, pb_warnings *warnings, pb_system **out,
+                          pb_system_stack *kept, pb_error *err) {
   *out = NULL;
   pb_layout layout = {0};
   pb_stack_equations stack = {0};
@@ -17,6 +55,12 @@ pb_status pb_system_assemble(const pb_plant *plant, pb_warnings *warnings, pb_sy
   if (!st) system->plant = plant;
   if (!st) st = pb_layout_build(plant, &layout, err);
   if (!st) st = pb_stack_build(plant, &layout, warnings, &stack, err);
+  if (!st && kept) st = stack_keep(&stack, kept, err);
+  if (!st && kept) {
+    system->displacing = stack.nu;
+    system->displacings = stack.n;
+    st = extend(&stack, err);
+  }
   if (!st) st = pb_null_build(&stack, warnings, &basis, err);
   if (!st && basis.rank == basis.n)
     st = pb_fail(err, PB_ERR_SINGULAR, "/connections",
@@ -27,13 +71,27 @@ pb_status pb_system_assemble(const pb_plant *plant, pb_warnings *warnings, pb_sy
     st = pb_fail(err, PB_ERR_SINGULAR, "/components", "nothing that can move has a mass");
   pb_null_clear(&basis);
   pb_stack_clear(&stack);
-  pb_layout_clear(&layout);
+  if (kept)
+    kept->layout = layout;
+  else
+    pb_layout_clear(&layout);
   if (st) {
     pb_system_free(system);
   } else {
     *out = system;
   }
   return st;
+}
+
+pb_status pb_system_assemble(const pb_plant *plant, pb_warnings *warnings, pb_system **out,
+                             pb_error *err) {
+  return assemble(plant, warnings, out, NULL, err);
+}
+
+pb_status pb_system_assemble_extended(const pb_plant *plant, pb_warnings *warnings, pb_system **out,
+                                      pb_system_stack *stack, pb_error *err) {
+  *stack = (pb_system_stack){0};
+  return assemble(plant, warnings, out, stack, err);
 }
 
 void pb_system_free(pb_system *system) {

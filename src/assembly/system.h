@@ -12,6 +12,7 @@
 #include <stddef.h>
 
 #include "base/status.h"
+#include "assembly/motion.h"
 #include "plant/plant.h"
 
 typedef struct pb_system {
@@ -21,13 +22,28 @@ typedef struct pb_system {
   double *y0, *y1, *y2;   // ny × n
   double *d;              // ny × nu
   const pb_plant *plant;  // names and rates; must outlive the system
+  // The inputs from `displacing` on, `displacings` of them, are displacements in the metric of M
+  // (f = M q sets η = Φᵀf at once) instead of forces; none in a plant as its file describes it.
+  size_t displacing, displacings;
 } pb_system;
+
+// The stacked equations that a system was made from, kept beside it.
+typedef struct pb_system_stack {
+  pb_layout layout;
+  double *m, *k;  // layout.size squared
+} pb_system_stack;
 
 // Assembles. [init] Fails with PB_ERR_SINGULAR (a massless motion without stiffness, naming its
 // component; no degree of freedom left), PB_ERR_GEOMETRY (frames of a connection that do not
 // coincide), PB_ERR_MEMORY, PB_ERR_NUMERIC.
 pb_status pb_system_assemble(const pb_plant *plant, pb_warnings *warnings, pb_system **out,
                              pb_error *err);
+
+// The same with each stacked coordinate as two more outputs (all q_i, then all q̇_i) and two more
+// inputs (a displacement of each, then an impulse on each), after the plant's own. *stack is the
+// caller's: layout (pb_layout_clear), m and k (free). [init]
+pb_status pb_system_assemble_extended(const pb_plant *plant, pb_warnings *warnings, pb_system **out,
+                                      pb_system_stack *stack, pb_error *err);
 
 void pb_system_free(pb_system *system);
 

@@ -191,9 +191,9 @@ static void copy_header(const pb_model *from, pb_model *to) {
 static pb_status copy_signals(const pb_model *from, pb_model *to, pb_error *err) {
   to->name = from->name ? pb_text_copy(from->name) : NULL;
   bool ok = !from->name || to->name;
-  for (size_t i = 0; i < from->nu + from->ny && ok; i++) {
-    const pb_signal *s = i < from->nu ? &from->input[i] : &from->output[i - from->nu];
-    pb_signal *t = i < from->nu ? &to->input[i] : &to->output[i - from->nu];
+  for (size_t i = 0; i < to->nu + to->ny && ok; i++) {
+    const pb_signal *s = i < to->nu ? &from->input[i] : &from->output[i - to->nu];
+    pb_signal *t = i < to->nu ? &to->input[i] : &to->output[i - to->nu];
     t->name = pb_text_copy(s->name);
     t->unit = pb_text_copy(s->unit);
     ok = t->name && t->unit;
@@ -257,6 +257,34 @@ static pb_status rebuild(const pb_model *m, double hz, pb_model **out, pb_error 
   } else {
     *out = copy;
   }
+  return st;
+}
+
+pb_status pb_model_narrow(const pb_model *m, size_t nu, size_t ny, pb_model **out, pb_error *err) {
+  const size_t values = m->block_value[m->blocks];
+  pb_model *n = pb_model_allocate(m->nx, nu, ny, m->modes, m->blocks, values);
+  *out = NULL;
+  if (!n) return pb_fail_memory(err, "");
+  n->sample_rate = m->sample_rate;
+  n->max_frequency = m->max_frequency;
+  n->dof = m->dof;
+  n->pairs = m->pairs;
+  n->widest = m->widest;
+  memcpy(n->mode_hz, m->mode_hz, m->modes * sizeof(double));
+  memcpy(n->mode_damping, m->mode_damping, m->modes * sizeof(double));
+  memcpy(n->block_start, m->block_start, (m->blocks + 1) * sizeof(size_t));
+  memcpy(n->block_value, m->block_value, (m->blocks + 1) * sizeof(size_t));
+  memcpy(n->a, m->a, values * sizeof(double));
+  memcpy(n->ad, m->ad, values * sizeof(double));
+  memcpy(n->b, m->b, m->nx * nu * sizeof(double));
+  memcpy(n->bd, m->bd, m->nx * nu * sizeof(double));
+  for (size_t j = 0; j < m->nx; j++) memcpy(n->c + j * ny, m->c + j * m->ny, ny * sizeof(double));
+  for (size_t i = 0; i < nu; i++) memcpy(n->d + i * ny, m->d + i * m->ny, ny * sizeof(double));
+  pb_status st = copy_signals(m, n, err);
+  if (st)
+    pb_model_free(n);
+  else
+    *out = n;
   return st;
 }
 

@@ -36,6 +36,10 @@ void pb_model_builder_discard(pb_model_builder *builder);
 pb_model *pb_model_allocate(size_t nx, size_t nu, size_t ny, size_t modes, size_t blocks,
                             size_t values);
 
+// A copy with the first nu inputs and the first ny outputs only.
+pb_status pb_model_narrow(const pb_model *model, size_t nu, size_t ny, pb_model **out,
+                          pb_error *err);
+
 // Fills ad and bd from a, b and sample_rate.
 pb_status pb_model_discretize(pb_model *model, pb_error *err);
 

@@ -94,7 +94,10 @@ static void group_fill(const pb_modes *m, group_system *g) {
     double s = state_scale(m, mode), w2 = m->omega[mode] * m->omega[mode];
     g->a[x + v * n] = s;
     g->a[v + x * n] = -w2 / s;
-    for (size_t i = 0; i < m->nu; i++) g->b[v + i * n] = m->force[mode + i * m->n];
+    for (size_t i = 0; i < m->nu; i++) {
+      const bool displaces = i - m->displacing < m->displacings;
+      g->b[(displaces ? x : v) + i * n] = (displaces ? s : 1) * m->force[mode + i * m->n];
+    }
     for (size_t i = 0; i < count; i++)
       g->a[2 * (count - 1 - i) + 1 + v * n] = -m->damping[g->mode[i] + mode * m->n];
     for (size_t o = 0; o < ny; o++) {
@@ -190,11 +193,13 @@ done:
   return st;
 }
 
-static pb_status copy_signals(const pb_port *port, size_t count, pb_signal *out, pb_error *err) {
+// Those beyond the plant's own, of an extended system, have no name.
+static pb_status copy_signals(const pb_port *port, size_t ports, size_t count, pb_signal *out,
+                              pb_error *err) {
   for (size_t i = 0; i < count; i++) {
-    out[i].name = pb_text_copy(port[i].name);
-    out[i].unit = pb_text_copy(pb_signal_unit(port[i].type));
-    if (!out[i].name || !out[i].unit) return pb_fail_memory(err, port[i].pointer);
+    out[i].name = pb_text_copy(i < ports ? port[i].name : "");
+    out[i].unit = pb_text_copy(i < ports ? pb_signal_unit(port[i].type) : "");
+    if (!out[i].name || !out[i].unit) return pb_fail_memory(err, "");
   }
   return PB_OK;
 }
@@ -208,24 +213,25 @@ static void fill_feedthrough(const pb_system *s, const pb_modes *m, double *d) {
 }
 
 // The electronics of one list of ports, the caller's; NULL where no port has any.
-static pb_status list_electronics(const pb_port *port, size_t count, pb_electronics **out,
-                                  pb_error *err) {
+static pb_status list_electronics(const pb_port *port, size_t ports, size_t count,
+                                  pb_electronics **out, pb_error *err) {
   bool any = false;
-  for (size_t i = 0; i < count; i++) any = any || port[i].has_electronics;
+  for (size_t i = 0; i < ports; i++) any = any || port[i].has_electronics;
   if (!any) return PB_OK;
   *out = malloc(count * sizeof **out);
   if (!*out) return pb_fail_memory(err, "electronics");
   for (size_t i = 0; i < count; i++)
-    (*out)[i] = port[i].has_electronics ? port[i].electronics : pb_electronics_none();
+    (*out)[i] = i < ports && port[i].has_electronics ? port[i].electronics : pb_electronics_none();
   return PB_OK;
 }
 
 static pb_status fill_signals(const pb_system *s, pb_model *model, pb_error *err) {
   const pb_plant *p = s->plant;
-  pb_status st = copy_signals(p->input, s->nu, model->input, err);
-  if (!st) st = copy_signals(p->output, s->ny, model->output, err);
-  if (!st) st = list_electronics(p->input, s->nu, &model->input_electronics, err);
-  if (!st) st = list_electronics(p->output, s->ny, &model->output_electronics, err);
+  const size_t nu = p->input_count, ny = p->output_count;
+  pb_status st = copy_signals(p->input, nu, s->nu, model->input, err);
+  if (!st) st = copy_signals(p->output, ny, s->ny, model->output, err);
+  if (!st) st = list_electronics(p->input, nu, s->nu, &model->input_electronics, err);
+  if (!st) st = list_electronics(p->output, ny, s->ny, &model->output_electronics, err);
   return st;
 }
 

@@ -222,7 +222,8 @@ static pb_status project(const pb_system *s, const double *shape, pb_modes *m, p
 
 static pb_status allocate(const pb_system *s, pb_modes *m, pb_error *err) {
   size_t n = s->n;
-  *m = (pb_modes){.n = n, .nu = s->nu, .ny = s->ny};
+  *m = (pb_modes){
+      .n = n, .nu = s->nu, .ny = s->ny, .displacing = s->displacing, .displacings = s->displacings};
   m->omega = malloc(n * sizeof(double));
   m->damping = malloc(n * n * sizeof(double));
   m->force = malloc(n * s->nu * sizeof(double));

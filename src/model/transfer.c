@@ -1,0 +1,165 @@
+// Preparing, applying and examining a transfer: see transfer.h.
+#include "model/transfer.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/lapack.h"
+#include "model/electronics.h"
+
+// c = a b + beta c; a is m × k, b k × n.
+static void multiply(size_t m, size_t n, size_t k, double alpha, const double *a, const double *b,
+                     double beta, double *c) {
+  const int im = (int)m, in = (int)n, ik = (int)k;
+  if (m && n) dgemm_("N", "N", &im, &in, &ik, &alpha, a, &im, b, &ik, &beta, c, &im);
+}
+
+// Work space of the preparation; nq old, nr new coordinates.
+typedef struct work {
+  double *l;        // nr × nq
+  double *bm;       // nx' × nr: B M'
+  double *bml;      // nx' × nq
+  double *static_;  // nr × nu: D_q' after the old inputs' names
+} work;
+
+static void work_clear(work *w) {
+  free(w->l);
+  free(w->bm);
+  free(w->bml);
+  free(w->static_);
+}
+
+// X += (B M' L) C, leaving B M' and B M' L in the work space.
+static void add_part(const pb_transfer *t, work *w, const double *b, const double *c) {
+  const pb_motion_map *from = t->from_map, *to = t->to_map;
+  multiply(to->nx, to->n, to->n, 1.0, b, to->m, 0.0, w->bm);
+  multiply(to->nx, from->n, to->n, 1.0, w->bm, w->l, 0.0, w->bml);
+  multiply(to->nx, from->nx, from->n, 1.0, w->bml, c, 1.0, t->x);
+}
+
+// What inputs hold statically without states: U = B_q M' (L D_q − D_q').
+static void add_static(const pb_transfer *t, work *w) {
+  const pb_motion_map *from = t->from_map, *to = t->to_map;
+  multiply(to->nx, from->nu, from->n, 1.0, w->bml, from->dq, 0.0, t->u);
+  for (size_t i = 0; i < to->nu; i++) {
+    if (t->input_from[i] < 0) continue;
+    memcpy(w->static_ + (size_t)t->input_from[i] * to->n, to->dq + i * to->n,
+           to->n * sizeof *w->static_);
+  }
+  multiply(to->nx, from->nu, to->n, -1.0, w->bm, w->static_, 1.0, t->u);
+}
+
+static pb_status matrices_make(pb_transfer *t, pb_error *err) {
+  const pb_motion_map *from = t->from_map, *to = t->to_map;
+  work w = {0};
+  pb_status st = pb_transfer_coordinates(from, to, &w.l, err);
+  w.bm = malloc(to->nx * to->n * sizeof(double));
+  w.bml = malloc(to->nx * from->n * sizeof(double));
+  w.static_ = calloc(to->n * from->nu + 1, sizeof(double));
+  if (!st && (!w.bm || !w.bml || !w.static_)) st = pb_fail_memory(err, "transfer");
+  if (!st) {
+    add_part(t, &w, to->bv, from->cv);
+    add_part(t, &w, to->bq, from->cq);
+    add_static(t, &w);  // with what the displacements have left
+  }
+  work_clear(&w);
+  return st;
+}
+
+static pb_status allocate(pb_transfer *t, pb_error *err) {
+  t->x = calloc(t->to->nx * t->from->nx, sizeof *t->x);
+  t->u = calloc(t->to->nx * t->from->nu, sizeof *t->u);
+  t->input_from = calloc(t->to->nu, sizeof *t->input_from);
+  t->output_from = calloc(t->to->ny, sizeof *t->output_from);
+  t->before = pb_state_new(t->from);
+  t->after = pb_state_new(t->to);
+  if (!t->x || !t->u || !t->input_from || !t->output_from || !t->before || !t->after)
+    return pb_fail_memory(err, "transfer");
+  for (size_t i = 0; i < t->to->nu; i++)
+    t->input_from[i] = pb_model_input(t->from, t->to->input[i].name);
+  for (size_t o = 0; o < t->to->ny; o++)
+    t->output_from[o] = pb_model_output(t->from, t->to->output[o].name);
+  return PB_OK;
+}
+
+pb_status pb_transfer_new(const pb_model *from, const pb_motion_map *from_map, const pb_model *to,
+                          const pb_motion_map *to_map, pb_transfer **out, pb_error *err) {
+  *out = NULL;
+  if (!from_map || !to_map)
+    return pb_fail(err, PB_ERR_STATE, "/components",
+                   "more than %d coordinates, elements' modes included, cannot be carried over "
+                   "while the plant runs",
+                   PB_MOTION_MAP_LARGEST);
+  pb_transfer *t = calloc(1, sizeof *t);
+  if (!t) return pb_fail_memory(err, "transfer");
+  t->from = from;
+  t->to = to;
+  t->from_map = from_map;
+  t->to_map = to_map;
+  pb_status st = allocate(t, err);
+  if (!st) st = matrices_make(t, err);
+  if (st)
+    pb_transfer_free(t);
+  else
+    *out = t;
+  return st;
+}
+
+void pb_transfer_free(pb_transfer *t) {
+  if (!t) return;
+  free(t->x);
+  free(t->u);
+  free(t->input_from);
+  free(t->output_from);
+  free(t->before);
+  free(t->after);
+  free(t);
+}
+
+static void add_columns(size_t rows, size_t cols, const double *a, const double *v, double *out) {
+  for (size_t j = 0; j < cols; j++)
+    for (size_t i = 0; i < rows; i++) out[i] += a[i + j * rows] * v[j];
+}
+
+void pb_transfer_apply(pb_transfer *t, const pb_state *before, pb_state *after) {
+  const size_t nx = t->from->nx, mx = t->to->nx;
+  memcpy(t->before, before, pb_state_bytes(t->from));
+  pb_electronics_carry(t->from, before, t->input_from, t->output_from, t->to, after);
+  memset(after->data, 0, mx * sizeof *after->data);
+  add_columns(mx, nx, t->x, before->data, after->data);
+  add_columns(mx, t->from->nu, t->u, before->data + nx, after->data);
+  after->step = before->step;
+  pb_state_measure(t->to, after);
+  memcpy(t->after, after, pb_state_bytes(t->to));
+}
+
+// Outputs of the plant itself: y = C x + D u.
+static void outputs(const pb_model *m, const pb_state *s, double *y) {
+  memset(y, 0, m->ny * sizeof *y);
+  add_columns(m->ny, m->nx, m->c, s->data, y);
+  add_columns(m->ny, m->nu, m->d, s->data + m->nx, y);
+}
+
+pb_status pb_transfer_examine(const pb_transfer *t, pb_transfer_report *out, pb_error *err) {
+  const pb_state *a = t->before, *b = t->after;
+  double *y = malloc((t->from->ny + t->to->ny) * sizeof *y);
+  *out = (pb_transfer_report){.worst_output = -1};
+  if (!y) return pb_fail_memory(err, "transfer");
+  double *now = y + t->from->ny;
+  outputs(t->from, a, y);
+  outputs(t->to, b, now);
+  for (size_t o = 0; o < t->to->ny; o++) {
+    if (t->output_from[o] < 0) continue;
+    const double jump = fabs(now[o] - y[t->output_from[o]]);
+    if (out->worst_output >= 0 && !(jump > out->output_jump)) continue;
+    out->output_jump = jump;
+    out->worst_output = (int)o;
+  }
+  free(y);
+  pb_status st =
+      pb_motion_map_energy(t->from_map, a->data, a->data + t->from->nx, &out->energy_before, err);
+  if (!st)
+    st = pb_motion_map_energy(t->to_map, b->data, b->data + t->to->nx, &out->energy_after, err);
+  return st;
+}
