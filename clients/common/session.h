@@ -133,9 +133,29 @@ typedef struct pb_run_options {
   double stall;
   bool (*interrupted)(void);
   void (*progress)(void *context, uint64_t samples);
+  bool any_revision;  // go on when the model is changed, as long as the numbers of inputs and
+                      // outputs stay; without it the run ends: two models are never mixed
 } pb_run_options;
 
 pb_status pb_session_run(pb_session *session, const pb_run_options *options, pb_run_report *report,
                          pb_error *err);
+
+// A block: `steps` rows of values for these inputs (indices into the model's; none: NULL, 0) are
+// held over as many steps in one exchange, on a plant that nobody else steps (paused, or lockstep
+// without barrier members).
+typedef struct pb_block {
+  uint64_t step;  // the step that the first row was held over
+  uint32_t epoch, revision, steps, input_count, output_count;
+  uint32_t *flags;  // [steps]; row r of all three is sample step + 1 + r
+  double *input;    // [steps][input_count], of the plant, as applied
+  double *output;   // [steps][output_count]
+} pb_block;
+
+// values: [steps][input_count]. *out is freed with pb_block_clear. [init] Fails with PB_ERR_STATE
+// (refused, with the daemon's reason, or no answer in time), PB_ERR_ARGUMENT, PB_ERR_MEMORY.
+pb_status pb_session_block(pb_session *session, const uint32_t *inputs, uint32_t input_count,
+                           const double *values, uint32_t steps, double timeout, pb_block *out,
+                           pb_error *err);
+void pb_block_clear(pb_block *block);
 
 #endif

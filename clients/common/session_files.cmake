@@ -6,6 +6,8 @@ set(PB_SESSION_SOURCES
   session_attach.c
   session_bus.c
   session_event.c
+
+  session_block.c
   session_find.c
   session_request.c
   session_run.c

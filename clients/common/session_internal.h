@@ -24,6 +24,7 @@ typedef struct pb_run {
   bool behind;    // newer samples are at hand: this one needs no answer
   uint64_t first_step, last_step;
   uint32_t epoch;
+  uint32_t revision;                 // whose samples are answered
   int64_t answered_at, progress_at;  // monotonic, ns
   uint64_t samples, missed;
   pb_status status;  // why it ended
@@ -41,7 +42,8 @@ struct pb_session {
   dds_entity_t participant, publisher, subscriber;
   dds_entity_t topic[PB_TOPIC_COUNT];
   dds_entity_t request, reply, event, sample, command;
-  dds_entity_t request_wait, sample_wait;  // waitsets
+  dds_entity_t request_wait, sample_wait;               // waitsets
+  dds_entity_t block_request, block_reply, block_wait;  // made with the first block
   plantbus_PlantDescription *received;
   pb_description description;
   pb_model *model;

@@ -1,6 +1,7 @@
 // Answering samples. In lockstep in the listener of the sample reader, in real time in the calling
 // thread; in both, the calling thread watches over the run.
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -25,12 +26,19 @@ static void run_fail(pb_session *s, pb_status status, const char *message) {
   run_end(s, pb_fail(&s->run.error, status, s->received->name, "%s", message));
 }
 
+static void revision_fail(pb_session *s, uint32_t revision) {
+  char message[128];
+  snprintf(message, sizeof message, "the plant's model was changed: revision %u became %u",
+           s->run.revision, revision);
+  run_fail(s, PB_ERR_STATE, message);
+}
+
 static bool sample_fits(pb_session *s, const plantbus_Sample *x) {
   if (x->epoch < s->run.epoch) return false;  // from before a reset
   if (x->epoch > s->run.epoch)
     run_fail(s, PB_ERR_STATE, "the plant was reset during the run");
-  else if (x->revision != s->received->revision)
-    run_fail(s, PB_ERR_STATE, "the plant's model was changed");
+  else if (x->revision != s->run.revision && !s->run.options->any_revision)
+    revision_fail(s, x->revision);
   else if (x->input_count != s->model->nu || x->output_count != s->model->ny)
     run_fail(s, PB_ERR_SYNTAX, "a sample does not fit the description");
   return s->run.active && x->step >= s->run.first_step;
@@ -208,6 +216,7 @@ static void run_begin(pb_session *s, const pb_run_options *o, const pb_standing 
                     .listener = standing->mode != PB_REALTIME,
                     .first_step = standing->mode != PB_REALTIME ? standing->step : 0,
                     .epoch = standing->epoch,
+                    .revision = s->received->revision,
                     .progress_at = pb_session_clock()};
   memset(&s->answer, 0, sizeof s->answer);
   s->answer.session = s->session;

@@ -184,9 +184,8 @@ pb_status configure_revert(const configure_options *o, pb_session *session, pb_e
     return pb_fail(err, PB_ERR_ARGUMENT, o->first, "is not the number of a revision");
   cJSON *body = cJSON_CreateObject();
   bool good = body && cJSON_AddNumberToObject(body, "revision", (double)revision);
-  if (good && o->at_step_given)
-    good = cJSON_AddNumberToObject(body, "at_step", (double)o->at_step) != NULL;
-  pb_status status = good ? ask(o, session, "revert", body, err) : pb_fail_memory(err, "request");
+  pb_status status = good ? add_options(o, body, err) : pb_fail_memory(err, "request");
+  if (!status) status = ask(o, session, "revert", body, err);
   cJSON_Delete(body);
   return status;
 }

@@ -47,10 +47,7 @@ pb_status pb_bench_open(const pb_common_options *common, pb_reset_choice reset, 
   out->model = pb_session_model(out->session);
   out->description = pb_session_description(out->session);
   out->realtime = out->description->mode == PB_REALTIME;
-  if (out->description->mode == PB_PAUSED) {
-    status = pb_fail(err, PB_ERR_STATE, out->description->name, "the plant is paused");
-  }
-  if (status == PB_OK) status = maybe_reset(out, reset, err);
+  status = maybe_reset(out, reset, err);
   if (status != PB_OK) pb_bench_close(out);
   return status;
 }
@@ -62,6 +59,9 @@ void pb_bench_close(pb_bench *bench) {
 
 pb_status pb_bench_attach(pb_bench *b, const char *channel, const size_t *input, size_t inputs,
                           double guard, pb_error *err) {
+  if (b->block > 0) return PB_OK;
+  if (b->description->mode == PB_PAUSED)
+    return pb_fail(err, PB_ERR_STATE, b->description->name, "the plant is paused");
   const char **name = malloc(inputs * sizeof *name);
   if (!name) return pb_fail_memory(err, channel);
   for (size_t i = 0; i < inputs; i++) name[i] = b->model->input[input[i]].name;
@@ -95,7 +95,10 @@ pb_status pb_bench_run(pb_bench *bench, pb_experiment *experiment, const char *l
   watcher w = {.total = (double)pb_experiment_round_steps(experiment)};
   pb_progress_begin(&w.progress, stderr, label);
   pb_experiment_watch watch = {pb_interrupted, show, &w};
-  pb_status status = pb_experiment_run(experiment, bench->session, &watch, report, err);
+  pb_status status =
+      bench->block > 0
+          ? pb_experiment_run_blocks(experiment, bench->session, bench->block, &watch, report, err)
+          : pb_experiment_run(experiment, bench->session, &watch, report, err);
   pb_progress_end(&w.progress);
   return status;
 }

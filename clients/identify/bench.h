@@ -18,16 +18,17 @@ typedef struct pb_bench {
   const pb_description *description;
   bool realtime;
   bool was_reset;
+  uint32_t block;  // steps of a block request; 0: step by step, attached
 } pb_bench;
 
-// Finds the plant and, as chosen, puts it at rest. PB_ERR_STATE also when the daemon is paused.
-// [init]
+// Finds the plant and, as chosen, puts it at rest. [init]
 pb_status pb_bench_open(const pb_common_options *common, pb_reset_choice reset, pb_bench *out,
                         pb_error *err);
 void pb_bench_close(pb_bench *bench);
 
 // Attaches a channel on inputs of the model, as a member of the lockstep barrier; silence is zero.
-// guard: seconds that lockstep waits for this client; 0: the daemon's default.
+// guard: seconds that lockstep waits for this client; 0: the daemon's default. Nothing to do where
+// blocks are used; PB_ERR_STATE when the plant is paused.
 pb_status pb_bench_attach(pb_bench *bench, const char *channel, const size_t *input, size_t inputs,
                           double guard, pb_error *err);
 void pb_bench_detach(pb_bench *bench);

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "control/lti_ops.h"
 #include "control/transient.h"
@@ -223,7 +224,7 @@ static void save_sample(const pb_experiment *e, const pb_sample *sample) {
   fwrite(sample->output, sizeof(double), sample->output_count, e->save);
 }
 
-static void excite(pb_experiment *e, uint64_t n) {
+void pb_experiment_excite(pb_experiment *e, uint64_t n) {
   size_t stage, m, settle, inputs = e->channels.inputs;
   locate(e, n, &stage, &m, &settle);
   // A round without settling starts where the signal's own settling part ends.
@@ -279,7 +280,7 @@ bool pb_experiment_on_sample(void *context, const pb_sample *sample, double *com
   if (n >= pb_experiment_round_steps(e)) return false;
   note_faults(e, sample);
   save_sample(e, sample);
-  excite(e, n);
+  pb_experiment_excite(e, n);
   control(e, sample, command);
   e->ending = over_limit(e, sample, command);
   memcpy(e->previous_y, sample->output, e->model->ny * sizeof *e->previous_y);
@@ -296,6 +297,19 @@ static pb_status limit_error(const pb_experiment *e, pb_error *err) {
       "the command reached %g at step %llu, beyond the limit of %g: the loop diverges or the "
       "excitation is too large; the commands were set to zero",
       t->limit_value, (unsigned long long)t->limit_step, e->options.limit);
+}
+
+pb_status pb_experiment_finish(pb_experiment *e, pb_status status, pb_error *err) {
+  e->begun = false;
+  if (status == PB_OK && e->trouble.over_limit) status = limit_error(e, err);
+  if (status == PB_OK) e->round++;
+  return status;
+}
+
+double pb_experiment_seconds(void) {
+  struct timespec t;
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
 // The session has one context for all its callbacks: the experiment passes the progress on.
@@ -315,10 +329,7 @@ pb_status pb_experiment_run(pb_experiment *e, pb_session *session, const pb_expe
                             .interrupted = e->watch.interrupted,
                             .progress = pass_progress};
   status = pb_session_run(session, &options, report, err);
-  e->begun = false;
-  if (status == PB_OK && e->trouble.over_limit) status = limit_error(e, err);
-  if (status == PB_OK) e->round++;
-  return status;
+  return pb_experiment_finish(e, status, err);
 }
 
 // One column of the response from each single-input estimate.

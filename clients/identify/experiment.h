@@ -100,6 +100,12 @@ void pb_experiment_save_to(pb_experiment *experiment, FILE *stream);
 pb_status pb_experiment_run(pb_experiment *experiment, pb_session *session,
                             const pb_experiment_watch *watch, pb_run_report *report, pb_error *err);
 
+// The same round in blocks of `steps` steps (pb_session_block): for a plant that nobody else steps,
+// without attaching, and without feedback (PB_ERR_ARGUMENT); a controller may be hosted. [init]
+pb_status pb_experiment_run_blocks(pb_experiment *experiment, pb_session *session, uint32_t steps,
+                                   const pb_experiment_watch *watch, pb_run_report *report,
+                                   pb_error *err);
+
 // Steps that the next round takes.
 uint64_t pb_experiment_round_steps(const pb_experiment *experiment);
 

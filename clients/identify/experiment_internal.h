@@ -52,4 +52,13 @@ pb_status pb_experiment_draw(pb_experiment *experiment, pb_error *err);
 // Allocates `signal` and the estimators. [init]
 pb_status pb_experiment_plan(pb_experiment *experiment, pb_error *err);
 
+// The excitation at index n of the round into w. [rt]
+void pb_experiment_excite(pb_experiment *experiment, uint64_t n);
+
+// The end of a round that came to this status.
+pb_status pb_experiment_finish(pb_experiment *experiment, pb_status status, pb_error *err);
+
+// Monotonic wall clock.
+double pb_experiment_seconds(void);
+
 #endif

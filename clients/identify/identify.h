@@ -12,6 +12,7 @@ typedef struct identify_options {
   pb_excite_options excite;
   pb_name_list inputs, outputs;
   double coherence_target;  // 0: none
+  uint32_t block;           // steps of a block; 0: step by step
   size_t most_averages;     // with a target; 0: 16 times the first
   const char *output_dir;   // NULL: no files, unless plots are wanted
   const char *samples;      // file of the raw samples, or NULL

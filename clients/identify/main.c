@@ -16,12 +16,17 @@ enum {
   KEY_TARGET,
   KEY_MOST,
   KEY_SAVE,
+  KEY_BLOCKS,
 };
 
 static const struct argp_option option_table[] = {
     {"json", KEY_JSON, NULL, 0, "Print JSON instead of tables", 1},
     {"output-dir", 'o', "DIR", 0, "Write identify.csv and identify.mat into DIR", 1},
     {"plot", KEY_PLOT, NULL, 0, "Draw Bode and coherence plots (PNG) into DIR, or here", 1},
+    {"blocks", KEY_BLOCKS, "STEPS", OPTION_ARG_OPTIONAL,
+     "Send and receive so many steps at a time (default 1000) instead of one: for a plant that "
+     "nobody else steps",
+     2},
     {"save-samples", KEY_SAVE, "FILE", 0,
      "Write the raw samples: step (uint64), inputs, outputs (double), a record a step", 1},
     {"input", KEY_INPUT, "NAMES", 0, "Inputs to excite, comma-separated or repeated (default: all)",
@@ -66,6 +71,9 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     break;
   case KEY_SAVE:
     o->samples = text;
+    break;
+  case KEY_BLOCKS:
+    o->block = text ? (uint32_t)pb_option_uint64(state, "--blocks", text, 1, 65536) : 1000;
     break;
   case KEY_INPUT:
     pb_option_names(state, "--input", text, &o->inputs);
@@ -225,9 +233,14 @@ static pb_status identify(const identify_options *o, pb_error *err) {
   pb_experiment *experiment = NULL;
   pb_status status = pb_bench_open(&o->common, o->excite.reset, &bench, err);
   if (status != PB_OK) return status;
+  bench.block = o->block;
+  if (o->block > 0 && bench.realtime)
+    status = pb_fail(err, PB_ERR_STATE, "--blocks", "the plant runs in real time");
   identify_result result = {.bench = &bench, .options = o};
-  status = pb_bench_choose(&o->inputs, bench.model->input, bench.model->nu, "input", &input,
-                           &channels.inputs, err);
+  if (status == PB_OK) {
+    status = pb_bench_choose(&o->inputs, bench.model->input, bench.model->nu, "input", &input,
+                             &channels.inputs, err);
+  }
   if (status == PB_OK) {
     status = pb_bench_choose(&o->outputs, bench.model->output, bench.model->ny, "output", &output,
                              &channels.outputs, err);
