@@ -17,7 +17,8 @@ static pb_status writers_create(pb_daemon *d, pb_error *err) {
               {&d->status, PB_TOPIC_STATUS},
               {&d->sample, PB_TOPIC_SAMPLE},
               {&d->reply, PB_TOPIC_REPLY},
-              {&d->event, PB_TOPIC_EVENT}};
+              {&d->event, PB_TOPIC_EVENT},
+              {&d->block_reply, PB_TOPIC_BLOCK_REPLY}};
   for (size_t i = 0; i < sizeof list / sizeof *list; i++) {
     const pb_topic t = list[i].topic;
     *list[i].writer = pb_writer_create(d->publisher, d->topic[t], t, 0.0);
@@ -38,6 +39,10 @@ static pb_status readers_create(pb_daemon *d, pb_error *err) {
   d->request =
       pb_reader_create(d->subscriber, d->topic[PB_TOPIC_REQUEST], PB_TOPIC_REQUEST, 0, NULL);
   if (d->request < 0) return failed(err, pb_topic_name(PB_TOPIC_REQUEST), d->request);
+  d->block_request = pb_reader_create(d->subscriber, d->topic[PB_TOPIC_BLOCK_REQUEST],
+                                      PB_TOPIC_BLOCK_REQUEST, 0, NULL);
+  if (d->block_request < 0)
+    return failed(err, pb_topic_name(PB_TOPIC_BLOCK_REQUEST), d->block_request);
   return PB_OK;
 }
 
@@ -49,9 +54,9 @@ pb_status pb_bus_create(pb_daemon *d, pb_error *err) {
     d->topic[t] = pb_topic_create(d->participant, (pb_topic)t);
     if (d->topic[t] < 0) return failed(err, pb_topic_name((pb_topic)t), d->topic[t]);
   }
-  d->publisher = pb_partition_create(d->participant, d->model->name, true);
+  d->publisher = pb_partition_create(d->participant, d->name, true);
   if (d->publisher < 0) return failed(err, "publisher", d->publisher);
-  d->subscriber = pb_partition_create(d->participant, d->model->name, false);
+  d->subscriber = pb_partition_create(d->participant, d->name, false);
   if (d->subscriber < 0) return failed(err, "subscriber", d->subscriber);
   d->wake = dds_create_guardcondition(d->participant);
   if (d->wake < 0) return failed(err, "guard condition", d->wake);

@@ -8,17 +8,16 @@
 
 void pb_bus_publish_sample(pb_daemon *d) {
   const pb_record *r = &d->current;
-  const size_t nu = d->model->nu, ny = d->model->ny;
   plantbus_Sample s = {.step = r->step,
-                       .time_ns = (int64_t)((double)r->step / d->model->sample_rate * 1e9 + 0.5),
+                       .time_ns = (int64_t)((double)r->step / d->engine.sample_rate * 1e9 + 0.5),
                        .epoch = r->epoch,
-                       .revision = 1,
+                       .revision = r->revision,
                        .flags = r->flags,
-                       .input_count = (uint32_t)nu,
-                       .output_count = (uint32_t)ny,
+                       .input_count = r->nu,
+                       .output_count = r->ny,
                        .decimation = d->engine.decimation};
-  memcpy(s.input, r->u, nu * sizeof(double));
-  memcpy(s.output, r->y, ny * sizeof(double));
+  memcpy(s.input, r->u, r->nu * sizeof(double));
+  memcpy(s.output, r->y, r->ny * sizeof(double));
   dds_write(d->sample, &s);
   d->sample_written = pb_daemon_clock();
 }
@@ -37,14 +36,47 @@ void pb_bus_note_faults(pb_daemon *d, const pb_record *record) {
   }
 }
 
-static void step_once(pb_daemon *d) {
+void pb_bus_change_made(pb_daemon *d) {
+  pb_pending *p = &d->pending;
+  p->armed = false;
+  p->made = true;
+  if (p->is_model) {
+    d->live = p->job.next;
+    pb_engine_relayout(&d->engine, (uint32_t)d->live->model->nu, p->change.input_from);
+  }
+  dds_set_guardcondition(d->wake, true);
+}
+
+// Where nobody is waiting for the next sample the current one is told anew, as the changed plant
+// sees it; a client in a loop sees the change with the next step.
+void pb_bus_change_due(pb_daemon *d) {
+  pb_pending *p = &d->pending;
+  if (!p->armed || d->engine.step < p->change.at_step) return;
+  pb_stepper_change(&d->stepper, &p->change);
+  pb_bus_change_made(d);
+  if (!p->is_model || pb_engine_barrier_count(&d->engine) > 0 || d->engine.budget > 0) return;
+  pb_stepper_renew(&d->stepper);
+  d->current = d->stepper.now;
+  pb_bus_publish_sample(d);
+}
+
+void pb_bus_step(pb_daemon *d, const double *beside) {
   double u[PB_STEPPER_INPUTS];
   bool held;
+  const int64_t begin = pb_daemon_clock();
+  if (d->pending.armed) pb_bus_change_due(d);
   pb_engine_input(&d->engine, u, &held);
+  for (uint32_t i = 0; beside && i < d->engine.nu; i++) u[i] += beside[i];
   pb_stepper_step(&d->stepper, u, held ? PB_FLAG_HELD : 0);
   d->current = d->stepper.now;
-  pb_engine_advance(&d->engine, d->current.step, pb_daemon_clock());
+  const int64_t now = pb_daemon_clock();
+  pb_histogram_add(&d->step_time, now - begin);
+  pb_engine_advance(&d->engine, d->current.step, now);
   pb_bus_note_faults(d, &d->current);
+}
+
+static void step_once(pb_daemon *d) {
+  pb_bus_step(d, NULL);
   if (d->current.step % d->engine.decimation == 0) pb_bus_publish_sample(d);
 }
 
@@ -61,7 +93,7 @@ static pb_verdict command_first(pb_daemon *d, const pb_command *command) {
   pb_member *member = pb_engine_find(&d->engine, command->session);
   uint8_t actual[16];
   if (!pb_bus_writer_is(d->command, command->writer, member->client, actual)) {
-    pb_engine_refuse(&d->engine, PB_VERDICT_FOREIGN);
+    pb_engine_refuse(&d->engine, command, PB_VERDICT_FOREIGN);
     return PB_VERDICT_FOREIGN;
   }
   member->writer = command->writer;

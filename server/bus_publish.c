@@ -37,12 +37,13 @@ static dds_sequence_string strings(char **list, size_t count) {
 }
 
 void pb_bus_publish_description(pb_daemon *d) {
-  const pb_model *m = d->model;
+  const pb_revision *live = pb_daemon_live(d);
+  const pb_model *m = live->model;
   name_lists lists;
   names_fill(m, &lists);
   plantbus_PlantDescription out = {
       .name = m->name,
-      .revision = 1,
+      .revision = live->number,
       .sample_rate = m->sample_rate,
       .states = (uint32_t)m->nx,
       .dof = (uint32_t)m->dof,
@@ -52,10 +53,10 @@ void pb_bus_publish_description(pb_daemon *d) {
       .output_units = strings(lists.output_unit, m->ny),
       .default_lease = d->options.lease,
       .default_guard = d->options.guard,
-      .plant_text = d->plant_text,
-      .plant_sha256 = d->plant_sha256,
+      .plant_text = live->text,
+      .plant_sha256 = (char *)live->sha256,
       .software_version = PB_VERSION,
-      .model = {(uint32_t)d->packed_count, (uint32_t)d->packed_count, d->packed, false}};
+      .model = {(uint32_t)live->packed_count, (uint32_t)live->packed_count, live->packed, false}};
   pthread_mutex_lock(&d->lock);
   out.epoch = d->engine.epoch;
   out.mode = (plantbus_RunMode)d->engine.drive;
@@ -87,7 +88,9 @@ static uint32_t attached_fill(const pb_engine *engine, plantbus_Attached *out, m
                                  .waited = waiting && m->barrier && !m->in,
                                  .priority = m->priority,
                                  .commands = m->commands,
-                                 .late = m->late};
+                                 .late = m->late,
+                                 .age = m->started ? engine->step - m->last_step : 0,
+                                 .age_max = m->age_max};
     memcpy(out[n].client, m->client, sizeof out[n].client);
     n++;
   }
@@ -105,7 +108,36 @@ static void counters_fill(pb_daemon *d, plantbus_PlantStatus *out) {
                                      .stale = v[PB_VERDICT_STALE]};
   out->late = v[PB_VERDICT_LATE] + atomic_load(&d->realtime.late);
   out->overruns = atomic_load(&d->realtime.overruns);
+  out->skipped = atomic_load(&d->realtime.skipped);
   out->dropped_samples = atomic_load(&d->realtime.dropped);
+}
+
+static void histogram_fill(const pb_histogram *from, plantbus_Histogram *out) {
+  out->count += atomic_load_explicit(&from->count, memory_order_relaxed);
+  out->sum += 1e-9 * (double)atomic_load_explicit(&from->sum_ns, memory_order_relaxed);
+  const double largest =
+      1e-9 * (double)atomic_load_explicit(&from->largest_ns, memory_order_relaxed);
+  if (largest > out->largest) out->largest = largest;
+  for (int i = 0; i < PB_HISTOGRAM_BINS; i++)
+    out->bin[i] += atomic_load_explicit(&from->bin[i], memory_order_relaxed);
+}
+
+static void histograms_fill(pb_daemon *d, plantbus_PlantStatus *out) {
+  histogram_fill(&d->step_time, &out->step_time);
+  histogram_fill(&d->realtime.step_time, &out->step_time);
+  histogram_fill(&d->realtime.jitter, &out->jitter);
+}
+
+static uint32_t hosted_fill(const pb_host *host, plantbus_Hosted *out) {
+  const size_t n = host ? pb_host_count(host) : 0;
+  for (size_t i = 0; i < n; i++) {
+    const pb_host_item_info *item = pb_host_info(host, i);
+    out[i] = (plantbus_Hosted){.channel = (char *)item->channel,
+                               .kind = (char *)item->kind,
+                               .done = pb_host_done(host, i),
+                               .client_name = (char *)item->client_name};
+  }
+  return (uint32_t)n;
 }
 
 static const char *obtained(bool asked, bool got) {
@@ -113,18 +145,23 @@ static const char *obtained(bool asked, bool got) {
 }
 
 static void realtime_text(const pb_daemon *d, char *text, size_t size) {
-  snprintf(text, size, "SCHED_FIFO: %s; affinity: %s; memory lock: %s",
+  const bool ran = atomic_load(&d->realtime.jitter.count) > 0;
+  snprintf(text, size, "SCHED_FIFO: %s; affinity: %s; memory lock: %s; denormals: %s",
            obtained(d->options.priority > 0, atomic_load(&d->realtime.fifo)),
            obtained(d->options.cpu >= 0, atomic_load(&d->realtime.affinity)),
-           obtained(d->options.lock_memory, d->memory_locked));
+           obtained(d->options.lock_memory, d->memory_locked),
+           !ran                              ? "not yet in real time"
+           : atomic_load(&d->realtime.flush) ? "flushed to zero"
+                                             : "not flushed");
 }
 
 void pb_bus_publish_status(pb_daemon *d) {
   plantbus_Attached attached[PB_ENGINE_MEMBERS];
   member_text text[PB_ENGINE_MEMBERS];
   uint64_t fault_step[PB_FLAG_COUNT];
-  char realtime[128];
-  plantbus_PlantStatus out = {.name = d->model->name, .revision = 1, .real_time = realtime};
+  char realtime[192];
+  plantbus_Hosted hosted[PB_HOST_ITEMS];
+  plantbus_PlantStatus out = {.name = d->name, .real_time = realtime};
   realtime_text(d, realtime, sizeof realtime);
   const int64_t now = pb_daemon_clock();
   pthread_mutex_lock(&d->lock);
@@ -132,6 +169,10 @@ void pb_bus_publish_status(pb_daemon *d) {
   out.speed = d->speed;
   out.decimation = d->engine.decimation;
   out.epoch = d->engine.epoch;
+  out.revision = d->live->number;
+  out.overrun_policy = (char *)pb_overrun_name(d->overrun);
+  out.hash = d->current.hash;
+  out.hash_step = d->current.step;
   out.step = d->engine.step;
   out.faults = d->faults;
   memcpy(fault_step, d->fault_step, sizeof fault_step);
@@ -141,6 +182,10 @@ void pb_bus_publish_status(pb_daemon *d) {
   out.fault_steps =
       (dds_sequence_unsigned_long_long){PB_FLAG_COUNT, PB_FLAG_COUNT, fault_step, false};
   out.attached = (dds_sequence_plantbus_Attached){n, n, attached, false};
+  const uint32_t items = hosted_fill(d->host, hosted);
+  out.hosted = (dds_sequence_plantbus_Hosted){items, items, hosted, false};
+  out.configuring = d->pending.used && d->pending.is_model;
+  histograms_fill(d, &out);
   const double seconds = (double)(now - d->status_written) * 1e-9;
   if (out.epoch == d->status_epoch && seconds > 0.0)
     out.steps_per_second = (double)(out.step - d->status_step) / seconds;
@@ -161,7 +206,7 @@ void pb_bus_publish_events(pb_daemon *d) {
     pthread_mutex_unlock(&d->lock);
     if (!any) return;
     plantbus_Event out = {.sequence_number = event.number,
-                          .plant = d->model->name,
+                          .plant = d->name,
                           .kind = (char *)pb_event_kind_name(event.kind),
                           .epoch = event.epoch,
                           .step = event.step,

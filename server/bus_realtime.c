@@ -8,7 +8,7 @@
 
 // Under lock: what acts now goes to the step thread; when its ring is full, with the next record.
 static void inputs_send(pb_daemon *d, uint64_t for_step, bool counted) {
-  pb_held_input input = {.for_step = for_step, .counted = counted};
+  pb_held_input input = {.for_step = for_step, .revision = d->live->number, .counted = counted};
   bool held;
   pb_engine_input(&d->engine, input.u, &held);
   d->input_owed = !pb_realtime_input(&d->realtime, &input);
@@ -51,12 +51,20 @@ static void record_publish(pb_daemon *d, const pb_record *record) {
   pthread_mutex_unlock(&d->lock);
 }
 
+static void change_made(pb_daemon *d) {
+  pthread_mutex_lock(&d->lock);
+  pb_bus_change_made(d);
+  pthread_mutex_unlock(&d->lock);
+}
+
 // Ends only after the step thread has, with the last record published.
 static void *publish_run(void *context) {
   pb_daemon *d = context;
   for (;;) {
     const bool last = atomic_load(&d->publish_stop);
     pb_record record;
+    if (pb_realtime_changed(&d->realtime)) change_made(d);
+    if (atomic_load(&d->realtime.gave_up)) dds_set_guardcondition(d->wake, true);
     while (pb_ring_take(&d->realtime.records, &record)) record_publish(d, &record);
     if (last) return NULL;
     while (sem_wait(&d->realtime.published) != 0 && errno == EINTR) {
@@ -87,7 +95,8 @@ pb_status pb_bus_realtime_start(pb_daemon *d, pb_error *err) {
   pthread_mutex_lock(&d->lock);
   pb_engine_input(&d->engine, u, &held);
   d->input_owed = false;
-  pb_realtime_options options = {d->speed, d->options.priority, d->options.cpu};
+  pb_realtime_options options = {d->speed, d->options.priority, d->options.cpu, d->overrun};
+  if (d->pending.armed) pb_realtime_change(&d->realtime, &d->pending.change);
   atomic_store_explicit(&d->realtime_mode, true, memory_order_release);
   pthread_mutex_unlock(&d->lock);
   pb_status status = pb_realtime_start(&d->realtime, &options, u, err);
@@ -109,7 +118,20 @@ void pb_bus_realtime_stop(pb_daemon *d) {
   // When the ring was full the last records are lost; the plant is where the stepper is.
   if (d->stepper.now.step > d->engine.step) record_publish(d, &d->stepper.now);
   pthread_mutex_lock(&d->lock);
+  if (pb_realtime_changed(&d->realtime)) pb_bus_change_made(d);
+  pb_realtime_change(&d->realtime, NULL);  // still armed: made by who steps next
   atomic_store_explicit(&d->realtime_mode, false, memory_order_release);
   pb_bus_take_commands(d, NULL);  // what came while the threads ended
   pthread_mutex_unlock(&d->lock);
+}
+
+void pb_bus_realtime_tend(pb_daemon *d) {
+  if (!atomic_load(&d->realtime.gave_up) || d->engine.drive != PB_DRIVE_REALTIME) return;
+  pb_bus_realtime_stop(d);
+  pthread_mutex_lock(&d->lock);
+  pb_engine_drive(&d->engine, PB_DRIVE_PAUSED, pb_daemon_clock());
+  pb_engine_note(&d->engine, PB_EVENT_OVERRUN, "paused at step %llu: a deadline was missed",
+                 (unsigned long long)d->engine.step);
+  pthread_mutex_unlock(&d->lock);
+  d->description_due = true;
 }

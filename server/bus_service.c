@@ -22,6 +22,8 @@ static dds_duration_t tend(pb_daemon *d) {
   const bool more = lockstep_tend(d);
   const bool waiting = pb_engine_waiting(&d->engine);
   pthread_mutex_unlock(&d->lock);
+  pb_bus_realtime_tend(d);
+  pb_configure_tend(d);
   pb_bus_publish_events(d);
   if (d->description_due) pb_bus_publish_description(d);
   if (d->status_due || pb_daemon_clock() - d->status_written >= status_ns) pb_bus_publish_status(d);
@@ -33,6 +35,8 @@ void *pb_bus_service(void *context) {
   const dds_entity_t waitset = dds_create_waitset(d->participant);
   const dds_entity_t condition = dds_create_readcondition(d->request, DDS_ANY_STATE);
   dds_waitset_attach(waitset, condition, 0);
+  const dds_entity_t blocks = dds_create_readcondition(d->block_request, DDS_ANY_STATE);
+  dds_waitset_attach(waitset, blocks, 0);
   dds_waitset_attach(waitset, d->wake, 0);
   dds_duration_t timeout = 0;
   while (!atomic_load(&d->stop)) {
@@ -40,11 +44,13 @@ void *pb_bus_service(void *context) {
     bool woken;
     dds_take_guardcondition(d->wake, &woken);
     pb_bus_take_requests(d);
+    pb_bus_take_blocks(d);
     timeout = tend(d);
   }
   pb_bus_realtime_stop(d);
   pb_bus_publish_events(d);
   dds_delete(condition);
+  dds_delete(blocks);
   dds_delete(waitset);
   return NULL;
 }

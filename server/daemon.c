@@ -1,12 +1,14 @@
 // Start and end of the daemon.
 #include "daemon.h"
 
-#include <openssl/evp.h>
+#include <libgen.h>
 #include <stdlib.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/mman.h>
 #include <time.h>
+
+#include "base/text.h"
 
 int64_t pb_daemon_clock(void) {
   struct timespec t;
@@ -14,28 +16,33 @@ int64_t pb_daemon_clock(void) {
   return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
 }
 
-static pb_status hash_text(const char *text, char hex[65], pb_error *err) {
-  unsigned char digest[EVP_MAX_MD_SIZE];
-  unsigned int length = 0;
-  if (EVP_Digest(text, strlen(text), digest, &length, EVP_sha256(), NULL) != 1 || length != 32)
-    return pb_fail(err, PB_ERR_IO, "SHA-256", "cannot be computed");
-  for (unsigned i = 0; i < length; i++) snprintf(hex + 2 * i, 3, "%02x", digest[i]);
-  return PB_OK;
+const pb_revision *pb_daemon_live(pb_daemon *d) {
+  pthread_mutex_lock(&d->lock);
+  const pb_revision *live = d->live;
+  pthread_mutex_unlock(&d->lock);
+  return live;
+}
+
+static pb_status names_make(pb_daemon *d, pb_error *err) {
+  char *path = pb_text_copy(d->options.plant);
+  d->directory = path ? pb_text_copy(dirname(path)) : NULL;
+  free(path);
+  d->name = pb_text_copy(d->live->model->name);
+  return d->name && d->directory ? PB_OK : pb_fail_memory(err, d->options.plant);
 }
 
 static pb_status plant_load(pb_daemon *d, pb_warnings *warnings, pb_error *err) {
-  cJSON *json = NULL;
-  pb_status status = pb_json_read(d->options.plant, &json, &d->plant_text, err);
-  cJSON_Delete(json);
-  if (!status) status = pb_model_load(d->options.plant, warnings, &d->model, err);
-  if (!status && !pb_plant_name_valid(d->model->name))
-    status =
-        pb_fail(err, PB_ERR_SCHEMA, "/name",
-                "expected 1 to 64 octets without * ? [ ] and control characters, to serve as a "
-                "partition");
-  if (!status) status = hash_text(d->plant_text, d->plant_sha256, err);
-  if (!status) status = pb_model_pack(d->model, &d->packed, &d->packed_count, err);
-  if (!status) status = pb_stepper_init(&d->stepper, d->model, err);
+  char *text = NULL, *path = pb_text_copy(d->options.plant);
+  size_t length;
+  pb_status status = path ? pb_text_read(d->options.plant, &text, &length, err)
+                          : pb_fail_memory(err, d->options.plant);
+  if (!status && strlen(text) != length)
+    status = pb_fail(err, PB_ERR_SYNTAX, d->options.plant, "holds a NUL");
+  if (!status) status = pb_revision_build(text, dirname(path), 1, warnings, &d->live, err);
+  free(text);
+  free(path);
+  if (!status) status = names_make(d, err);
+  if (!status) status = pb_stepper_init(&d->stepper, d->live->model, err);
   return status;
 }
 
@@ -66,6 +73,7 @@ pb_status pb_daemon_load(pb_daemon *d, const pb_daemon_options *options, pb_warn
   memset(d, 0, sizeof *d);
   d->options = *options;
   d->speed = options->speed;
+  d->overrun = options->overrun;
   pthread_mutex_init(&d->lock, NULL);
   pb_status status = plant_load(d, warnings, err);
   if (!status) status = pb_realtime_init(&d->realtime, &d->stepper, err);
@@ -73,9 +81,13 @@ pb_status pb_daemon_load(pb_daemon *d, const pb_daemon_options *options, pb_warn
     pb_daemon_stop(d);
     return status;
   }
-  pb_engine_init(&d->engine, (uint32_t)d->model->nu, d->model->sample_rate);
+  pb_engine_init(&d->engine, (uint32_t)d->live->model->nu, d->live->model->sample_rate);
   d->current = d->stepper.now;
-  return PB_OK;
+  d->revisions_made = 1;
+  pb_configure_first(d);
+  if (options->restore) status = pb_daemon_resume(d, err);
+  if (status) pb_daemon_stop(d);
+  return status;
 }
 
 pb_status pb_daemon_start(pb_daemon *d, pb_error *err) {
@@ -86,7 +98,7 @@ pb_status pb_daemon_start(pb_daemon *d, pb_error *err) {
   return status;
 }
 
-void pb_daemon_stop(pb_daemon *d) {
+bool pb_daemon_stop(pb_daemon *d) {
   atomic_store(&d->stop, true);
   if (d->service_running) {
     dds_set_guardcondition(d->wake, true);
@@ -99,11 +111,14 @@ void pb_daemon_stop(pb_daemon *d) {
   pthread_mutex_unlock(&d->lock);
   if (d->participant > 0) dds_delete(d->participant);
   pb_realtime_free(&d->realtime);
-  for (size_t i = 0; i < PB_DAEMON_SNAPSHOTS; i++) free(d->snapshot[i].state);
+  const bool whole = pb_configure_end(d);
+  for (size_t i = 0; i < PB_DAEMON_SNAPSHOTS; i++) pb_snapshot_clear(&d->snapshot[i].data);
   pb_stepper_free(&d->stepper);
-  pb_model_free(d->model);
-  free(d->packed);
-  free(d->plant_text);
+  if (!whole) return false;
+  pb_revision_free(d->live);
+  free(d->name);
+  free(d->directory);
   pthread_mutex_destroy(&d->lock);
   memset(d, 0, sizeof *d);
+  return true;
 }

@@ -58,18 +58,24 @@ typedef enum pb_verdict {
 } pb_verdict;
 
 // Kinds of events: name on the bus.
-#define PB_EVENT_LIST(X)                                                       \
-  X(ATTACHED, "attached")                                                      \
-  X(DETACHED, "detached")                                                      \
-  X(EVICTED, "evicted")       /* a barrier member was late beyond its guard */ \
-  X(LOST, "lost")             /* a client died, or gave no sign of life */     \
-  X(LEASE_OVER, "lease_over") /* no command for the time of the lease */       \
-  X(TAKEOVER, "takeover")     /* another member acts on the channel now */     \
-  X(MODE, "mode")                                                              \
-  X(RESET, "reset")                                                            \
-  X(RESTORED, "restored")                                                      \
-  X(STEPPED, "stepped") /* the steps of an accepted step request are done */   \
-  X(FAULT, "fault")     /* a fault bit is set for the first time */            \
+#define PB_EVENT_LIST(X)                                                                           \
+  X(ATTACHED, "attached")                                                                          \
+  X(DETACHED, "detached")                                                                          \
+  X(EVICTED, "evicted")       /* a barrier member was late beyond its guard */                     \
+  X(LOST, "lost")             /* a client died, or gave no sign of life */                         \
+  X(LEASE_OVER, "lease_over") /* no command for the time of the lease */                           \
+  X(TAKEOVER, "takeover")     /* another member acts on the channel now */                         \
+  X(MODE, "mode")                                                                                  \
+  X(RESET, "reset")                                                                                \
+  X(RESTORED, "restored")                                                                          \
+  X(STEPPED, "stepped")           /* the steps of an accepted step request are done */             \
+  X(FAULT, "fault")               /* a fault bit is set for the first time */                      \
+  X(REFUSED, "refused")           /* a command, for the 1st, 10th, 100th … time of its cause */  \
+  X(RECONFIGURED, "reconfigured") /* another revision of the model is stepped */                   \
+  X(CONFIGURE_FAILED, "configure_failed") /* of a request that was accepted */                     \
+  X(HOSTED, "hosted")                     /* a controller or an excitation runs inside the step */ \
+  X(UNHOSTED, "unhosted")                 /* … was removed, or has come to its end */            \
+  X(OVERRUN, "overrun")                   /* real time was given up: overrun policy "stop" */      \
   X(SHUTDOWN, "shutdown")
 
 typedef enum pb_event_kind {
@@ -109,6 +115,7 @@ typedef struct pb_member {
   int64_t waiting_since;           // wall clock: when the current step began, or it attached
   double value[PB_ENGINE_INPUTS];  // last command
   uint64_t commands, late;
+  uint64_t age_max;  // steps from the step a command was for to its arrival
 } pb_member;
 
 typedef struct pb_channel {
@@ -194,9 +201,11 @@ typedef struct pb_command {
 
 // Judges a command and, unless refused, makes it the member's value. UNKNOWN_WRITER: nothing is
 // counted; the caller checks the writer's client, sets member->writer and asks again, or calls
-// pb_engine_refuse(PB_VERDICT_FOREIGN). No allocation. [rt]
+// pb_engine_refuse(PB_VERDICT_FOREIGN, …). Refusals are told by an event that names whose command
+// it was, at the 1st, 10th, 100th … of each cause: a flood of them does not become a flood of
+// events. No allocation. [rt]
 pb_verdict pb_engine_command(pb_engine *engine, const pb_command *command);
-void pb_engine_refuse(pb_engine *engine, pb_verdict cause);
+void pb_engine_refuse(pb_engine *engine, const pb_command *command, pb_verdict cause);
 
 // --- engine_step.c ---
 
@@ -216,6 +225,16 @@ bool pb_engine_guard(pb_engine *engine, int64_t now);
 
 // A new epoch: step count anew, rests gone, members stay and owe a command for `step`. [any]
 void pb_engine_restart(pb_engine *engine, uint64_t step, int64_t now);
+
+// The plant's inputs are now nu others: from[nu] says which of the old ones each is (−1: a new
+// one). Members and channels keep what they hold by that; a member one of whose inputs is gone is
+// dropped. [any]
+void pb_engine_relayout(pb_engine *engine, uint32_t nu, const int *from);
+
+// The first member that has an input which the new layout lacks, or NULL; *input is its old index.
+// [any]
+const pb_member *pb_engine_misses(const pb_engine *engine, uint32_t nu, const int *from,
+                                  uint32_t *input);
 
 // Allows n ≥ 1 steps, whoever drives; members' waiting starts anew. [any]
 void pb_engine_allow(pb_engine *engine, uint64_t n, int64_t now);

@@ -50,6 +50,24 @@ static void first_command(pb_engine *engine, pb_member *member) {
                    member->client_name, channel->name, acting->client_name);
 }
 
+static bool power_of_ten(uint64_t n) {
+  while (n >= 10 && n % 10 == 0) n /= 10;
+  return n == 1;
+}
+
+void pb_engine_refuse(pb_engine *engine, const pb_command *command, pb_verdict cause) {
+  const uint64_t times = ++engine->verdicts[cause];
+  if (!power_of_ten(times)) return;
+  const pb_member *m = pb_engine_find(engine, command->session);
+  pb_engine_note(engine, PB_EVENT_REFUSED,
+                 "a command for step %llu at step %llu was refused: %s (%llu so far); session "
+                 "%016llx%s%s%s",
+                 (unsigned long long)command->step, (unsigned long long)engine->step,
+                 pb_verdict_name(cause), (unsigned long long)times,
+                 (unsigned long long)command->session, m ? " of '" : ", which is not attached",
+                 m ? m->client_name : "", m ? "'" : "");
+}
+
 pb_verdict pb_engine_command(pb_engine *engine, const pb_command *command) {
   pb_member *member = pb_engine_find(engine, command->session);
   pb_verdict verdict = judge(engine, member, command);
@@ -57,18 +75,20 @@ pb_verdict pb_engine_command(pb_engine *engine, const pb_command *command) {
   if (verdict == PB_VERDICT_DUPLICATE &&
       memcmp(member->value, command->input, command->count * sizeof(double)) == 0)
     verdict = PB_VERDICT_REPEATED;
+  if (verdict >= PB_VERDICT_SESSION) {
+    pb_engine_refuse(engine, command, verdict);
+    return verdict;
+  }
   engine->verdicts[verdict]++;
-  if (verdict != PB_VERDICT_ACCEPTED && verdict != PB_VERDICT_LATE) return verdict;
+  if (verdict == PB_VERDICT_REPEATED) return verdict;
   memcpy(member->value, command->input, command->count * sizeof(double));
   member->in = true;
   member->last_step = command->step ? command->step : engine->step;
+  const uint64_t age = engine->step - member->last_step;
+  if (age > member->age_max) member->age_max = age;
   member->heard_step = engine->step;
   member->commands++;
   if (verdict == PB_VERDICT_LATE) member->late++;
   if (!member->started) first_command(engine, member);
   return verdict;
-}
-
-void pb_engine_refuse(pb_engine *engine, pb_verdict cause) {
-  engine->verdicts[cause]++;
 }

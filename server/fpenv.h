@@ -3,7 +3,15 @@
 #ifndef PB_FPENV_H
 #define PB_FPENV_H
 
+#include <stdbool.h>
 #include <stdint.h>
+
+// Whether this thread flushes denormals now, tried out. [rt]
+static inline bool pb_denormals_are_flushed(void) {
+  volatile double tiny = 1e-308;
+  volatile double product = tiny * 0.01;
+  return product == 0.0;
+}
 
 #if defined(__SSE2__)
 #include <immintrin.h>

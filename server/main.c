@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 
 #ifdef PB_HAVE_SYSTEMD
@@ -42,7 +43,7 @@ static void tell_warnings(const char *plant, pb_warnings *warnings) {
 }
 
 static void tell_ready(const pb_daemon *daemon) {
-  const pb_model *m = daemon->model;
+  const pb_model *m = daemon->live->model;
   printf("plantbusd: ready: plant '%s', %zu states, %g Hz, %s, domain %u\n", m->name, m->nx,
          m->sample_rate, pb_drive_name(daemon->options.mode), daemon->options.domain);
   fflush(stdout);
@@ -96,6 +97,7 @@ int main(int argc, char **argv) {
   if (!status) status = pb_daemon_start(daemon, &err);
   if (status) {
     char text[800];
+    if (strcmp(err.where, options.plant) == 0) err.where[0] = '\0';
     pb_error_format(&err, text, sizeof text);
     fprintf(stderr, "plantbusd: %s: %s\n", options.plant, text);
     free(daemon);
@@ -106,7 +108,8 @@ int main(int argc, char **argv) {
   notify("READY=1");
   end_wait();
   notify("STOPPING=1");
-  pb_daemon_stop(daemon);
+  // What a compile thread still works on cannot be freed, nor the thread be waited for.
+  if (!pb_daemon_stop(daemon)) _exit(0);
   free(daemon);
   return 0;
 }

@@ -16,7 +16,10 @@ enum {
   KEY_INTERFACE,
   KEY_PRIORITY,
   KEY_CPU,
-  KEY_LOCK_MEMORY
+  KEY_LOCK_MEMORY,
+  KEY_OVERRUN,
+  KEY_STATE,
+  KEY_RESTORE
 };
 
 static const struct argp_option option_list[] = {
@@ -29,6 +32,11 @@ static const struct argp_option option_list[] = {
      0},
     {"guard", KEY_GUARD, "S", 0,
      "Wall-clock time that lockstep waits for a client, when it does not say (default 2)", 0},
+    {"overrun", KEY_OVERRUN, "POLICY", 0,
+     "Real time, when a deadline is missed: catch-up (default), skip or stop", 0},
+    {"state", KEY_STATE, "DIR", 0,
+     "Directory of snapshot files (without it clients cannot have any written or read)", 0},
+    {"restore", KEY_RESTORE, "FILE", 0, "Go on from this snapshot file", 0},
     {"allow-shutdown", KEY_ALLOW_SHUTDOWN, NULL, 0, "Clients may end the daemon", 0},
     {NULL, 0, NULL, 0, "Network:", 1},
     {"domain", 'd', "N", 0, "DDS domain, 0 (default) to 230", 1},
@@ -102,6 +110,18 @@ static error_t parse(int key, char *arg, struct argp_state *state) {
     return 0;
   case KEY_GUARD:
     options->guard = number(state, "guard", arg, 1e-3, 3600.0);
+    return 0;
+  case KEY_OVERRUN: {
+    const int policy = pb_overrun_parse(arg);
+    if (policy < 0) argp_error(state, "--overrun: expected catch-up, skip or stop");
+    options->overrun = (pb_overrun)policy;
+    return 0;
+  }
+  case KEY_STATE:
+    options->state_directory = arg;
+    return 0;
+  case KEY_RESTORE:
+    options->restore = arg;
     return 0;
   case KEY_ALLOW_SHUTDOWN:
     options->allow_shutdown = true;

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <sched.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <time.h>
 
 #include "fpenv.h"
@@ -28,14 +29,35 @@ static bool sleep_until(const pb_realtime *rt, int64_t deadline) {
   return true;
 }
 
-// The newest inputs there are; LATE when they were meant for a step that is over.
-static uint32_t inputs_take(pb_realtime *rt, pb_held_input *held) {
+// What the step thread keeps to itself.
+typedef struct step_run {
+  pb_held_input held;
+  uint32_t former_revision;  // whose inputs may still be on their way
+  int input_from[PB_STEPPER_INPUTS];
+  int64_t start;  // deadline 0
+  uint64_t k;     // number of the next deadline
+  double interval;
+} step_run;
+
+static void inputs_relayout(const int *from, size_t nu, double *u) {
+  double old[PB_STEPPER_INPUTS];
+  memcpy(old, u, sizeof old);
+  for (size_t i = 0; i < nu; i++) u[i] = from[i] >= 0 ? old[from[i]] : 0.0;
+}
+
+// The newest inputs there are; LATE when they were meant for a step that is over. Those of the
+// model before the last change are put into the order of the present one; older ones are too old.
+static uint32_t inputs_take(pb_realtime *rt, step_run *run) {
   uint32_t flags = 0;
   pb_held_input next;
   while (pb_ring_take(&rt->inputs, &next)) {
-    *held = next;
+    if (next.revision != rt->stepper->revision) {
+      if (next.revision != run->former_revision) continue;
+      inputs_relayout(run->input_from, rt->stepper->model->nu, next.u);
+    }
+    run->held = next;
     if (next.for_step >= rt->stepper->now.step) continue;
-    if (!next.counted) atomic_fetch_add_explicit(&rt->late, 1, memory_order_relaxed);
+    if (!next.counted) pb_histogram_raise(&rt->late, 1);
     flags |= PB_FLAG_LATE;
   }
   return flags;
@@ -45,42 +67,93 @@ static void scheduling_ask(pb_realtime *rt) {
   const struct sched_param param = {.sched_priority = rt->options.priority};
   atomic_store(&rt->fifo, rt->options.priority > 0 &&
                               pthread_setschedparam(pthread_self(), SCHED_FIFO, &param) == 0);
-  if (rt->options.cpu < 0) return;
-  cpu_set_t set;
-  CPU_ZERO(&set);
-  CPU_SET((size_t)rt->options.cpu, &set);
-  atomic_store(&rt->affinity, pthread_setaffinity_np(pthread_self(), sizeof set, &set) == 0);
+  if (rt->options.cpu >= 0) {
+    cpu_set_t set;
+    CPU_ZERO(&set);
+    CPU_SET((size_t)rt->options.cpu, &set);
+    atomic_store(&rt->affinity, pthread_setaffinity_np(pthread_self(), sizeof set, &set) == 0);
+  }
+  pb_flush_denormals();
+  atomic_store(&rt->flush, pb_denormals_are_flushed());
+}
+
+static void change_make(pb_realtime *rt, step_run *run) {
+  pb_change *change = atomic_load_explicit(&rt->change, memory_order_acquire);
+  if (!change || rt->stepper->state->step < change->at_step) return;
+  if (change->model) {
+    run->former_revision = rt->stepper->revision;
+    memcpy(run->input_from, change->input_from, sizeof run->input_from);
+  }
+  const bool model = change->model != NULL;
+  pb_stepper_change(rt->stepper, change);
+  if (model) inputs_relayout(run->input_from, rt->stepper->model->nu, run->held.u);
+  atomic_store_explicit(&rt->change, NULL, memory_order_relaxed);
+  atomic_store_explicit(&rt->changed, change, memory_order_release);
+  sem_post(&rt->published);
+}
+
+static void step_take(pb_realtime *rt, step_run *run, uint32_t flags) {
+  const int64_t begin = clock_now();
+  flags |= inputs_take(rt, run);
+  pb_stepper_step(rt->stepper, run->held.u, flags);
+  pb_histogram_add(&rt->step_time, clock_now() - begin);
+  if (!pb_ring_put(&rt->records, &rt->stepper->now)) pb_histogram_raise(&rt->dropped, 1);
+  sem_post(&rt->published);
+}
+
+// What a missed deadline leads to. False: the thread ends.
+static bool overrun_follow(pb_realtime *rt, step_run *run, int64_t behind) {
+  pb_histogram_raise(&rt->overruns, 1);
+  switch (rt->options.overrun) {
+  case PB_OVERRUN_STOP:
+    atomic_store(&rt->gave_up, true);
+    sem_post(&rt->published);
+    return false;
+  case PB_OVERRUN_SKIP: {
+    const uint64_t over = (uint64_t)((double)behind / run->interval);
+    run->k += over;
+    pb_histogram_raise(&rt->skipped, over);
+    return true;
+  }
+  default:
+    if ((double)behind <= PB_REALTIME_BEHIND * 1e9) return true;
+    pb_histogram_raise(&rt->slips, 1);
+    run->start = clock_now();
+    run->k = 0;
+    return true;
+  }
 }
 
 // Deadline k is start + k·interval, computed anew each time: no rounding adds up.
 static void *step_thread(void *context) {
   pb_realtime *rt = context;
-  const double interval = 1e9 / (rt->stepper->model->sample_rate * rt->options.speed);
-  pb_held_input held;
-  memset(&held, 0, sizeof held);
+  step_run run = {.former_revision = UINT32_MAX,
+                  .interval = 1e9 / (rt->stepper->model->sample_rate * rt->options.speed)};
+  prctl(PR_SET_NAME, "pb-step");
   scheduling_ask(rt);
-  pb_flush_denormals();
-  int64_t start = clock_now();
-  for (uint64_t k = 1; !atomic_load_explicit(&rt->stop, memory_order_relaxed); k++) {
-    const int64_t deadline = start + llround((double)k * interval);
+  run.start = clock_now();
+  for (run.k = 1; !atomic_load_explicit(&rt->stop, memory_order_relaxed); run.k++) {
+    const int64_t deadline = run.start + llround((double)run.k * run.interval);
     if (!sleep_until(rt, deadline)) break;
     const int64_t behind = clock_now() - deadline;
-    uint32_t flags = inputs_take(rt, &held);
-    if ((double)behind > interval) {
-      atomic_fetch_add_explicit(&rt->overruns, 1, memory_order_relaxed);
-      flags |= PB_FLAG_OVERRUN;
-    }
-    pb_stepper_step(rt->stepper, held.u, flags);
-    if (!pb_ring_put(&rt->records, &rt->stepper->now))
-      atomic_fetch_add_explicit(&rt->dropped, 1, memory_order_relaxed);
-    sem_post(&rt->published);
-    if ((double)behind > PB_REALTIME_BEHIND * 1e9) {
-      atomic_fetch_add_explicit(&rt->slips, 1, memory_order_relaxed);
-      start = clock_now();
-      k = 0;
-    }
+    const bool overrun = (double)behind > run.interval;
+    pb_histogram_add(&rt->jitter, behind);
+    change_make(rt, &run);
+    step_take(rt, &run, overrun ? PB_FLAG_OVERRUN : 0);
+    if (overrun && !overrun_follow(rt, &run, behind)) break;
   }
   return NULL;
+}
+
+const char *pb_overrun_name(pb_overrun overrun) {
+  static const char *const name[] = {"catch-up", "skip", "stop"};
+  return name[overrun];
+}
+
+int pb_overrun_parse(const char *name) {
+  for (int i = PB_OVERRUN_CATCH_UP; i <= PB_OVERRUN_STOP; i++)
+    if (strcmp(name, pb_overrun_name((pb_overrun)i)) == 0) return i;
+  return -1;
 }
 
 pb_status pb_realtime_init(pb_realtime *realtime, pb_stepper *stepper, pb_error *err) {
@@ -105,13 +178,13 @@ pb_status pb_realtime_start(pb_realtime *realtime, const pb_realtime_options *op
                PB_REALTIME_RECORDS);
   pb_ring_init(&realtime->inputs, realtime->input_slot, sizeof realtime->input_slot[0],
                PB_REALTIME_INPUTS);
-  pb_held_input first = {.for_step = UINT64_MAX};
+  pb_held_input first = {.for_step = UINT64_MAX, .revision = realtime->stepper->revision};
   memcpy(first.u, u, realtime->stepper->model->nu * sizeof *u);
   pb_ring_put(&realtime->inputs, &first);
   atomic_store(&realtime->stop, false);
+  atomic_store(&realtime->gave_up, false);
   const int code = pthread_create(&realtime->thread, NULL, step_thread, realtime);
   if (code) return pb_fail(err, PB_ERR_IO, "step thread", "cannot be started: %s", strerror(code));
-  pthread_setname_np(realtime->thread, "pb-step");
   realtime->running = true;
   return PB_OK;
 }
@@ -125,4 +198,12 @@ void pb_realtime_stop(pb_realtime *realtime) {
 
 bool pb_realtime_input(pb_realtime *realtime, const pb_held_input *input) {
   return pb_ring_put(&realtime->inputs, input);
+}
+
+void pb_realtime_change(pb_realtime *realtime, pb_change *change) {
+  atomic_store_explicit(&realtime->change, change, memory_order_release);
+}
+
+pb_change *pb_realtime_changed(pb_realtime *realtime) {
+  return atomic_exchange_explicit(&realtime->changed, NULL, memory_order_acq_rel);
 }

@@ -10,11 +10,23 @@
 static const struct {
   const char *kind;
   pb_request_handler handler;
-} table[] = {{"attach", pb_request_attach},     {"detach", pb_request_detach},
-             {"ping", pb_request_ping},         {"get_description", pb_request_get_description},
-             {"set_mode", pb_request_set_mode}, {"step", pb_request_step},
-             {"reset", pb_request_reset},       {"snapshot", pb_request_snapshot},
-             {"restore", pb_request_restore},   {"decimate", pb_request_decimate},
+} table[] = {{"attach", pb_request_attach},
+             {"detach", pb_request_detach},
+             {"ping", pb_request_ping},
+             {"get_description", pb_request_get_description},
+             {"set_mode", pb_request_set_mode},
+             {"step", pb_request_step},
+             {"reset", pb_request_reset},
+             {"snapshot", pb_request_snapshot},
+             {"restore", pb_request_restore},
+             {"configure", pb_request_configure},
+             {"revert", pb_request_revert},
+             {"history", pb_request_history},
+             {"get_revision", pb_request_get_revision},
+             {"host_controller", pb_request_host},
+             {"excite", pb_request_host},
+             {"remove_controller", pb_request_unhost},
+             {"decimate", pb_request_decimate},
              {"shutdown", pb_request_shutdown}};
 
 static pb_status body_parse(const char *text, cJSON **body, pb_error *err) {
@@ -34,8 +46,8 @@ static pb_status dispatch(pb_daemon *d, const plantbus_Request *in, pb_request *
                  in->kind);
 }
 
-static void reply_write(pb_daemon *d, const uint8_t client[16], uint64_t id, const char *status,
-                        const pb_error *err, const char *result) {
+void pb_bus_reply(pb_daemon *d, const uint8_t client[16], uint64_t id, const char *status,
+                  const pb_error *err, const char *result) {
   plantbus_Reply reply = {.id = id,
                           .status = (char *)status,
                           .pointer = (char *)err->where,
@@ -49,26 +61,26 @@ static void serve(pb_daemon *d, const plantbus_Request *in) {
   pb_error err = {PB_OK, "", ""};
   cJSON *body = NULL;
   char *text = NULL;
-  pb_request request = {.client = in->client, .result = cJSON_CreateObject()};
+  pb_request request = {
+      .client = in->client, .id = in->id, .kind = in->kind, .result = cJSON_CreateObject()};
   pb_status status =
       request.result ? body_parse(in->body, &body, &err) : pb_fail_memory(&err, "reply");
   request.body = body;
   if (!status) status = dispatch(d, in, &request, &err);
   if (!status) status = pb_json_print_compact(request.result, &text, &err);
   const char *word = status ? "refused" : request.accepted ? "accepted" : "ok";
-  reply_write(d, in->client, in->id, word, &err, status ? "{}" : text);
+  if (!request.deferred) pb_bus_reply(d, in->client, in->id, word, &err, status ? "{}" : text);
   cJSON_free(text);
   cJSON_Delete(request.result);
   cJSON_Delete(body);
 }
 
-static bool answered_before(pb_daemon *d, const plantbus_Request *in) {
+bool pb_bus_answered_before(pb_daemon *d, const uint8_t client[16], uint64_t id) {
   for (size_t i = 0; i < PB_DAEMON_ANSWERED; i++)
-    if (d->answered[i].id == in->id && memcmp(d->answered[i].client, in->client, 16) == 0)
-      return true;
+    if (d->answered[i].id == id && memcmp(d->answered[i].client, client, 16) == 0) return true;
   pb_answered *place = &d->answered[d->answered_next++ % PB_DAEMON_ANSWERED];
-  memcpy(place->client, in->client, sizeof place->client);
-  place->id = in->id;
+  memcpy(place->client, client, sizeof place->client);
+  place->id = id;
   return false;
 }
 
@@ -90,10 +102,10 @@ static void request_judge(pb_daemon *d, const plantbus_Request *in, const dds_sa
     pb_error err;
     pb_fail(&err, PB_ERR_STATE, "client", "the client id is not that of the participant");
     if (memcmp(actual, nobody, sizeof actual) != 0)
-      reply_write(d, actual, in->id, "refused", &err, "{}");
+      pb_bus_reply(d, actual, in->id, "refused", &err, "{}");
     return;
   }
-  if (!answered_before(d, in)) serve(d, in);
+  if (!pb_bus_answered_before(d, in->client, in->id)) serve(d, in);
 }
 
 // The end of a client's writer is told with its last request when that was still here. Anyone may

@@ -6,6 +6,7 @@
 
 #include "daemon.h"
 #include "fpenv.h"
+#include "hash.h"
 #include "request_body.h"
 
 static pb_status result_number(pb_request *request, const char *key, double value, pb_error *err) {
@@ -14,14 +15,14 @@ static pb_status result_number(pb_request *request, const char *key, double valu
 }
 
 // What changes the plant's state stops the step thread for that moment. True when it ran.
-static bool realtime_pause(pb_daemon *d) {
+bool pb_daemon_halt(pb_daemon *d) {
   if (d->engine.drive != PB_DRIVE_REALTIME) return false;
   pb_bus_realtime_stop(d);
   return true;
 }
 
 // A daemon whose step thread cannot be started again is paused, and says so.
-static pb_status realtime_resume(pb_daemon *d, bool ran, pb_error *err) {
+pb_status pb_daemon_continue(pb_daemon *d, bool ran, pb_error *err) {
   pb_status status = ran ? pb_bus_realtime_start(d, err) : PB_OK;
   if (!status) return PB_OK;
   pthread_mutex_lock(&d->lock);
@@ -33,14 +34,19 @@ static pb_status realtime_resume(pb_daemon *d, bool ran, pb_error *err) {
 }
 
 static pb_status mode_read(pb_daemon *d, const cJSON *body, pb_drive *drive, double *speed,
-                           pb_error *err) {
-  static const char *const keys[] = {"mode", "speed", NULL};
-  const char *mode = NULL;
+                           pb_overrun *overrun, pb_error *err) {
+  static const char *const keys[] = {"mode", "speed", "overrun", NULL};
+  const char *mode = NULL, *policy = pb_overrun_name(d->overrun);
   *speed = d->speed;
   pb_status status = pb_body_known(body, keys, err);
   if (!status) status = pb_body_string(body, "mode", true, &mode, err);
   if (!status) status = pb_body_number(body, "speed", speed, err);
+  if (!status) status = pb_body_string(body, "overrun", false, &policy, err);
   if (status) return status;
+  const int known = pb_overrun_parse(policy);
+  if (known < 0)
+    return pb_fail(err, PB_ERR_SCHEMA, "/overrun", "expected \"catch-up\", \"skip\" or \"stop\"");
+  *overrun = (pb_overrun)known;
   const int parsed = pb_drive_parse(mode);
   if (parsed < 0)
     return pb_fail(err, PB_ERR_SCHEMA, "/mode",
@@ -54,17 +60,19 @@ static pb_status mode_read(pb_daemon *d, const cJSON *body, pb_drive *drive, dou
 pb_status pb_request_set_mode(pb_daemon *d, pb_request *request, pb_error *err) {
   pb_drive drive = PB_DRIVE_PAUSED;
   double speed;
-  pb_status status = mode_read(d, request->body, &drive, &speed, err);
+  pb_overrun overrun = PB_OVERRUN_CATCH_UP;
+  pb_status status = mode_read(d, request->body, &drive, &speed, &overrun, err);
   if (status) return status;
-  realtime_pause(d);
+  pb_daemon_halt(d);
   pthread_mutex_lock(&d->lock);
   pb_engine_drive(&d->engine, drive, pb_daemon_clock());
   d->speed = speed;
+  d->overrun = overrun;
   pb_engine_note(&d->engine, PB_EVENT_MODE, "mode is %s, speed %g", pb_drive_name(drive), speed);
   if (drive != PB_DRIVE_REALTIME && !pb_bus_run_ready(d)) pb_bus_publish_sample(d);
   pthread_mutex_unlock(&d->lock);
   d->description_due = true;
-  return realtime_resume(d, drive == PB_DRIVE_REALTIME, err);
+  return pb_daemon_continue(d, drive == PB_DRIVE_REALTIME, err);
 }
 
 pb_status pb_request_step(pb_daemon *d, pb_request *request, pb_error *err) {
@@ -91,68 +99,34 @@ pb_status pb_request_step(pb_daemon *d, pb_request *request, pb_error *err) {
   return status ? status : result_number(request, "step", (double)step, err);
 }
 
-// A new epoch from rest (state NULL) or from a saved state.
-static pb_status restart(pb_daemon *d, pb_request *request, const pb_state *state,
-                         pb_event_kind kind, const char *text, pb_error *err) {
-  const bool ran = realtime_pause(d);
-  pthread_mutex_lock(&d->lock);
-  pb_engine_restart(&d->engine, state ? state->step : 0, pb_daemon_clock());
+// Under lock, and not in real time. During the start nobody listens yet.
+void pb_daemon_restart(pb_daemon *d, const pb_snapshot_data *from, pb_event_kind kind,
+                       const char *text) {
+  pb_engine_restart(&d->engine, from ? from->step : 0, pb_daemon_clock());
   const uint32_t epoch = d->engine.epoch;
   const uint64_t saved = pb_flush_denormals();
-  pb_stepper_restart(&d->stepper, state, epoch);
+  pb_stepper_restart(&d->stepper, from ? from->state : NULL, from ? from->hash : PB_HASH_START,
+                     epoch);
   pb_restore_denormals(saved);
   d->current = d->stepper.now;
   d->faults = 0;
   memset(d->fault_step, 0, sizeof d->fault_step);
   pb_engine_note(&d->engine, kind, "%s, epoch %u begins", text, epoch);
-  pb_bus_publish_sample(d);
-  pthread_mutex_unlock(&d->lock);
+  if (d->listening) pb_bus_publish_sample(d);
   d->description_due = true;
-  pb_status status = result_number(request, "epoch", epoch, err);
-  const pb_status resumed = realtime_resume(d, ran, err);
-  return status ? status : resumed;
 }
 
 pb_status pb_request_reset(pb_daemon *d, pb_request *request, pb_error *err) {
   static const char *const keys[] = {NULL};
   pb_status status = pb_body_known(request->body, keys, err);
   if (status) return status;
-  return restart(d, request, NULL, PB_EVENT_RESET, "the plant is at rest", err);
-}
-
-pb_status pb_request_snapshot(pb_daemon *d, pb_request *request, pb_error *err) {
-  static const char *const keys[] = {NULL};
-  pb_status status = pb_body_known(request->body, keys, err);
-  if (status) return status;
-  pb_snapshot *place = &d->snapshot[d->snapshots_made % PB_DAEMON_SNAPSHOTS];
-  const size_t bytes = pb_state_bytes(d->model);
-  pb_state *copy = malloc(bytes);
-  if (!copy) return pb_fail_memory(err, "snapshot");
-  const bool ran = realtime_pause(d);
+  const bool ran = pb_daemon_halt(d);
   pthread_mutex_lock(&d->lock);
-  memcpy(copy, d->stepper.state, bytes);
+  pb_daemon_restart(d, NULL, PB_EVENT_RESET, "the plant is at rest");
+  const uint32_t epoch = d->engine.epoch;
   pthread_mutex_unlock(&d->lock);
-  free(place->state);  // the oldest of PB_DAEMON_SNAPSHOTS
-  place->state = copy;
-  place->id = ++d->snapshots_made;
-  status = result_number(request, "snapshot", place->id, err);
-  if (!status) status = result_number(request, "step", (double)copy->step, err);
-  const pb_status resumed = realtime_resume(d, ran, err);
-  return status ? status : resumed;
-}
-
-pb_status pb_request_restore(pb_daemon *d, pb_request *request, pb_error *err) {
-  static const char *const keys[] = {"snapshot", NULL};
-  double id = 0.0;
-  pb_status status = pb_body_known(request->body, keys, err);
-  if (!status) status = pb_body_integer(request->body, "snapshot", true, 1.0, 4e9, &id, err);
-  if (status) return status;
-  for (size_t i = 0; i < PB_DAEMON_SNAPSHOTS; i++)
-    if (d->snapshot[i].state && d->snapshot[i].id == (uint32_t)id)
-      return restart(d, request, d->snapshot[i].state, PB_EVENT_RESTORED, "a snapshot is restored",
-                     err);
-  return pb_fail(err, PB_ERR_REFERENCE, "/snapshot", "there is no snapshot %.0f (%d are kept)", id,
-                 PB_DAEMON_SNAPSHOTS);
+  status = pb_daemon_continue(d, ran, err);
+  return status ? status : result_number(request, "epoch", epoch, err);
 }
 
 static bool others_wait(const pb_engine *engine, const uint8_t client[16]) {

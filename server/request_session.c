@@ -21,8 +21,8 @@ static pb_status session_new(pb_daemon *d, uint64_t *session, pb_error *err) {
   return PB_OK;
 }
 
-static pb_status inputs_read(const pb_daemon *d, const cJSON *body, uint32_t *index,
-                             uint32_t *count, pb_error *err) {
+static pb_status inputs_read(pb_daemon *d, const cJSON *body, uint32_t *index, uint32_t *count,
+                             pb_error *err) {
   const cJSON *list = pb_json_member(body, "inputs");
   *count = 0;
   if (!cJSON_IsArray(list) || cJSON_GetArraySize(list) < 1)
@@ -31,7 +31,7 @@ static pb_status inputs_read(const pb_daemon *d, const cJSON *body, uint32_t *in
     char where[64];
     snprintf(where, sizeof where, "/inputs/%u", *count);
     if (!cJSON_IsString(item)) return pb_fail(err, PB_ERR_SCHEMA, where, "expected a name");
-    const int i = pb_model_input(d->model, item->valuestring);
+    const int i = pb_model_input(pb_daemon_live(d)->model, item->valuestring);
     if (i < 0)
       return pb_fail(err, PB_ERR_REFERENCE, where, "the plant has no input '%.64s'",
                      item->valuestring);
@@ -144,8 +144,13 @@ pb_status pb_request_ping(pb_daemon *d, pb_request *request, pb_error *err) {
   const pb_drive drive = d->engine.drive;
   const uint64_t event = d->engine.events_made;
   const uint32_t members = pb_engine_member_count(&d->engine);
+  const uint32_t revision = d->live->number;
+  char hash[24];
+  session_text(d->current.hash, hash);
   pthread_mutex_unlock(&d->lock);
   if (!cJSON_AddNumberToObject(request->result, "members", members) ||
+      !cJSON_AddNumberToObject(request->result, "revision", revision) ||
+      !cJSON_AddStringToObject(request->result, "hash", hash) ||
       !cJSON_AddNumberToObject(request->result, "step", (double)step) ||
       !cJSON_AddNumberToObject(request->result, "epoch", epoch) ||
       !cJSON_AddNumberToObject(request->result, "event", (double)event) ||
@@ -180,10 +185,11 @@ pb_status pb_request_get_description(pb_daemon *d, pb_request *request, pb_error
   const double speed = d->speed;
   pthread_mutex_unlock(&d->lock);
   cJSON *result = request->result;
-  const pb_model *m = d->model;
+  const pb_revision *live = pb_daemon_live(d);
+  const pb_model *m = live->model;
   if (!cJSON_AddStringToObject(result, "name", m->name) ||
       !cJSON_AddStringToObject(result, "version", PB_VERSION) ||
-      !cJSON_AddNumberToObject(result, "revision", 1) ||
+      !cJSON_AddNumberToObject(result, "revision", live->number) ||
       !cJSON_AddNumberToObject(result, "epoch", epoch) ||
       !cJSON_AddNumberToObject(result, "sample_rate", m->sample_rate) ||
       !cJSON_AddNumberToObject(result, "states", (double)m->nx) ||
@@ -193,8 +199,8 @@ pb_status pb_request_get_description(pb_daemon *d, pb_request *request, pb_error
       !cJSON_AddStringToObject(result, "mode", pb_drive_name(drive)) ||
       !cJSON_AddNumberToObject(result, "speed", speed) ||
       !cJSON_AddNumberToObject(result, "decimation", decimation) ||
-      !cJSON_AddStringToObject(result, "plant_sha256", d->plant_sha256) ||
-      !cJSON_AddStringToObject(result, "plant_text", d->plant_text))
+      !cJSON_AddStringToObject(result, "plant_sha256", live->sha256) ||
+      !cJSON_AddStringToObject(result, "plant_text", live->text))
     return pb_fail_memory(err, "reply");
   return PB_OK;
 }

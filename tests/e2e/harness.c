@@ -14,6 +14,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "base/json.h"
 #include "bus_domain.h"
 
 static double clock_seconds(void) {
@@ -37,7 +38,7 @@ void e2e_until(bool (*condition)(void *context), void *context, const char *what
 
 // Domains are reserved by locked files, which the kernel frees with the process.
 uint32_t e2e_domain(void) {
-  for (uint32_t domain = 60; domain < 100; domain++) {
+  for (uint32_t domain = 60; domain < 150; domain++) {
     char path[64];
     snprintf(path, sizeof path, "/tmp/plantbus-test-domain-%u", domain);
     const int fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
@@ -138,6 +139,36 @@ void e2e_request(pb_session *session, const char *kind, const char *body) {
   pb_error err = {PB_OK, "", ""};
   if (pb_session_request(session, kind, body, E2E_CAP, NULL, &err))
     fail_msg("%s: %s: %s", kind, err.where, err.message);
+}
+
+char *e2e_result(pb_session *session, const char *kind, const char *body) {
+  char *result = NULL;
+  pb_error err = {PB_OK, "", ""};
+  if (pb_session_request(session, kind, body, E2E_CAP, &result, &err))
+    fail_msg("%s: %s: %s", kind, err.where, err.message);
+  return result;
+}
+
+double e2e_number(pb_session *session, const char *kind, const char *body, const char *key) {
+  char *result = e2e_result(session, kind, body);
+  cJSON *json = NULL;
+  pb_error err = {PB_OK, "", ""};
+  assert_int_equal(pb_json_parse(result, strlen(result), &json, &err), PB_OK);
+  const cJSON *item = pb_json_member(json, key);
+  if (!cJSON_IsNumber(item)) fail_msg("%s: no number '%s' in %s", kind, key, result);
+  const double value = item->valuedouble;
+  cJSON_Delete(json);
+  free(result);
+  return value;
+}
+
+void e2e_refused(pb_session *session, const char *kind, const char *body, const char *pointer,
+                 const char *words) {
+  pb_error err = {PB_OK, "", ""};
+  if (pb_session_request(session, kind, body, E2E_CAP, NULL, &err) == PB_OK)
+    fail_msg("%s %s was not refused", kind, body);
+  if (strcmp(err.where, pointer) != 0 || !strstr(err.message, words))
+    fail_msg("%s was refused at '%s' (expected '%s'): %s", kind, err.where, pointer, err.message);
 }
 
 e2e_raw e2e_raw_join(const e2e_daemon *daemon) {

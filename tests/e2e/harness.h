@@ -58,6 +58,14 @@ void e2e_attach(pb_session *session, const char *channel, const char *input, dou
 // A request that must succeed; its result is thrown away.
 void e2e_request(pb_session *session, const char *kind, const char *body);
 
+// A request's result: a number of it; or its whole text, owned by the caller.
+double e2e_number(pb_session *session, const char *kind, const char *body, const char *key);
+char *e2e_result(pb_session *session, const char *kind, const char *body);
+
+// A request that must be refused, at this JSON pointer and with these words in its message.
+void e2e_refused(pb_session *session, const char *kind, const char *body, const char *pointer,
+                 const char *words);
+
 // Calls the condition until it is true; fails at the cap.
 void e2e_until(bool (*condition)(void *context), void *context, const char *what);
 

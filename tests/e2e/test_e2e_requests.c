@@ -2,23 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/json.h"
 #include "harness.h"
-
-static double number(pb_session *session, const char *kind, const char *body, const char *key) {
-  char *result = NULL;
-  cJSON *json = NULL;
-  pb_error err = {PB_OK, "", ""};
-  if (pb_session_request(session, kind, body, E2E_CAP, &result, &err))
-    fail_msg("%s: %s: %s", kind, err.where, err.message);
-  assert_int_equal(pb_json_parse(result, strlen(result), &json, &err), PB_OK);
-  const cJSON *item = pb_json_member(json, key);
-  if (!cJSON_IsNumber(item)) fail_msg("%s: no number '%s' in %s", kind, key, result);
-  const double value = item->valuedouble;
-  cJSON_Delete(json);
-  free(result);
-  return value;
-}
 
 static void steps_are_taken_on_request(void **state) {
   (void)state;
@@ -26,8 +10,8 @@ static void steps_are_taken_on_request(void **state) {
   e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, paused);
   pb_session *session = e2e_open(&daemon);
   assert_int_equal(pb_session_description(session)->mode, PB_PAUSED);
-  assert_true(number(session, "step", "{\"n\":10}", "step") == 10.0);
-  assert_true(number(session, "step", NULL, "step") == 11.0);
+  assert_true(e2e_number(session, "step", "{\"n\":10}", "step") == 10.0);
+  assert_true(e2e_number(session, "step", NULL, "step") == 11.0);
   e2e_request(session, "set_mode", "{\"mode\":\"lockstep\"}");
   e2e_attach(session, "test", "Va", 0.0);
   pb_error err;
@@ -48,7 +32,7 @@ static void many_steps_end_with_an_event(void **state) {
   e2e_request(session, "decimate", "{\"n\":1000}");
   e2e_request(session, "step", "{\"n\":100000}");
   e2e_event_wait(events, "stepped", message);
-  assert_true(number(session, "ping", NULL, "step") == 100000.0);
+  assert_true(e2e_number(session, "ping", NULL, "step") == 100000.0);
   pb_session_close(session);
   dds_delete(raw.participant);
   e2e_daemon_end(&daemon);
@@ -83,11 +67,11 @@ static void a_restored_snapshot_goes_on_bit_for_bit(void **state) {
   pb_session *session = e2e_open(&daemon);
   e2e_attach(session, "test", "Va", 0.0);
   run(session, &warm_up);
-  const double id = number(session, "snapshot", NULL, "snapshot");
+  const double id = e2e_number(session, "snapshot", NULL, "snapshot");
   run(session, &first);
   char body[64];
   snprintf(body, sizeof body, "{\"snapshot\":%.0f}", id);
-  assert_true(number(session, "restore", body, "epoch") == 2.0);
+  assert_true(e2e_number(session, "restore", body, "epoch") == 2.0);
   run(session, &second);
   assert_int_equal(second.first, first.first);
   assert_int_equal(first.first, STEPS - 1);
@@ -104,7 +88,7 @@ static void a_reset_begins_again_from_rest(void **state) {
   pb_session *session = e2e_open(&daemon);
   e2e_attach(session, "test", "Va", 0.0);
   run(session, &first);
-  assert_true(number(session, "reset", NULL, "epoch") == 2.0);
+  assert_true(e2e_number(session, "reset", NULL, "epoch") == 2.0);
   run(session, &second);
   assert_int_equal(second.first, 0);
   assert_memory_equal(second.y, first.y, sizeof first.y);

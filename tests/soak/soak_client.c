@@ -82,8 +82,11 @@ static pb_status attach(soak_client *c, soak_run *run, pb_error *err) {
 static pb_status stay(soak_client *c, pb_error *err) {
   pb_run_report report = {0};
   soak_run run = {.left = 100 + draw(c, 10000), .amplitude = 0.1 * pb_random_uniform(&c->random)};
-  const pb_run_options options = {
-      .on_sample = on_sample, .context = &run, .stall = 2.0, .interrupted = pb_interrupted};
+  const pb_run_options options = {.on_sample = on_sample,
+                                  .context = &run,
+                                  .stall = 2.0,
+                                  .interrupted = pb_interrupted,
+                                  .any_revision = draw(c, 2) > 0};
   pb_status status = draw(c, 6) > 0 ? attach(c, &run, err) : PB_OK;
   if (status) return status;
   status = pb_session_run(c->session, &options, &report, err);

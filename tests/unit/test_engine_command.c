@@ -1,6 +1,7 @@
 // Judging commands: each cause of refusal is counted under its name and never acts.
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "engine_rig.h"
 
@@ -49,6 +50,27 @@ static void refusals_are_counted_and_harmless(void **state) {
   free(r);
 }
 
+// Named with the client and the cause, at the 1st, 10th, 100th time: a flood is not passed on.
+static void refusals_are_told_with_a_name(void **state) {
+  (void)state;
+  rig *r = rig_new();
+  char text[320];
+  rig_attach(r, 1, "a", 0);
+  rig_event(r, PB_EVENT_ATTACHED, NULL);
+  const uint64_t before = r->engine.events_made;
+  for (int i = 0; i < 50; i++) assert_int_equal(rig_command(r, 1, 3, 1.0), PB_VERDICT_STEP);
+  assert_int_equal(r->engine.events_made, before + 2);
+  assert_true(rig_event(r, PB_EVENT_REFUSED, text));
+  assert_non_null(strstr(text, "'one'"));
+  assert_non_null(strstr(text, "refused: step (10 so far)"));
+  const double value = 1.0;
+  const pb_command stranger = {99, 0, 0, 1, &value, 5};
+  assert_int_equal(pb_engine_command(&r->engine, &stranger), PB_VERDICT_SESSION);
+  assert_true(rig_event(r, PB_EVENT_REFUSED, text));
+  assert_non_null(strstr(text, "0000000000000063, which is not attached"));
+  free(r);
+}
+
 static void a_writer_is_checked_before_it_is_believed(void **state) {
   (void)state;
   rig *r = rig_new();
@@ -58,7 +80,7 @@ static void a_writer_is_checked_before_it_is_believed(void **state) {
   const pb_command command = {1, 0, 0, 1, &value, 77};
   assert_int_equal(pb_engine_command(&r->engine, &command), PB_VERDICT_UNKNOWN_WRITER);
   assert_int_equal(member->commands, 0);
-  pb_engine_refuse(&r->engine, PB_VERDICT_FOREIGN);
+  pb_engine_refuse(&r->engine, &command, PB_VERDICT_FOREIGN);
   assert_int_equal(r->engine.verdicts[PB_VERDICT_FOREIGN], 1);
   member->writer = 77;
   assert_int_equal(pb_engine_command(&r->engine, &command), PB_VERDICT_ACCEPTED);
@@ -106,6 +128,7 @@ static void in_lockstep_a_free_runner_may_be_late(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(refusals_are_counted_and_harmless),
+      cmocka_unit_test(refusals_are_told_with_a_name),
       cmocka_unit_test(a_writer_is_checked_before_it_is_believed),
       cmocka_unit_test(in_real_time_late_commands_act_and_are_counted),
       cmocka_unit_test(in_lockstep_a_free_runner_may_be_late),
