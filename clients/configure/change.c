@@ -2,6 +2,7 @@
 // to the plant's outputs and energy.
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "base/json.h"
 #include "configure.h"
@@ -124,7 +125,15 @@ static pb_status ask(const configure_options *o, pb_session *session, const char
   return status;
 }
 
+// Under this name the change stands in events and in the history.
+static bool add_name(cJSON *body) {
+  char name[64];
+  snprintf(name, sizeof name, "%.40s[%d]", program_invocation_short_name, (int)getpid());
+  return cJSON_AddStringToObject(body, "name", name) != NULL;
+}
+
 static pb_status add_options(const configure_options *o, cJSON *body, pb_error *err) {
+  if (!add_name(body)) return pb_fail_memory(err, "request");
   if (o->at_step_given && !cJSON_AddNumberToObject(body, "at_step", (double)o->at_step))
     return pb_fail_memory(err, "request");
   if (o->comment && !cJSON_AddStringToObject(body, "comment", o->comment))

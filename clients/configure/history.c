@@ -1,6 +1,7 @@
 // The revisions of a daemon's plant.
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "base/json.h"
 #include "configure.h"
@@ -71,13 +72,34 @@ static void number(pb_table *table, const cJSON *entry, const char *key) {
     pb_table_text(table, "");
 }
 
+static void count(pb_table *table, const cJSON *entry, const char *key) {
+  const cJSON *item = pb_json_member(entry, key);
+  if (cJSON_IsNumber(item) && item->valuedouble >= 0.0)
+    pb_table_count(table, (size_t)item->valuedouble);
+  else
+    pb_table_text(table, "");
+}
+
+// Seconds since 1970 as the local date and time of day.
+static pb_status when(pb_table *table, const cJSON *entry, pb_error *err) {
+  const cJSON *item = pb_json_member(entry, "time");
+  char text[32];
+  struct tm local;
+  const time_t seconds = cJSON_IsNumber(item) ? (time_t)item->valuedouble : 0;
+  if (!cJSON_IsNumber(item) || !localtime_r(&seconds, &local) ||
+      strftime(text, sizeof text, "%F %T", &local) == 0)
+    return cell(table, entry, "time", err);
+  pb_table_text(table, text);
+  return PB_OK;
+}
+
 static pb_status row(pb_table *table, const cJSON *entry, pb_error *err) {
-  number(table, entry, "revision");
-  pb_status status = cell(table, entry, "time", err);
-  number(table, entry, "epoch");
-  number(table, entry, "step");
+  count(table, entry, "revision");
+  pb_status status = when(table, entry, err);
+  count(table, entry, "epoch");
+  count(table, entry, "step");
   if (!status) status = cell(table, entry, "client_name", err);
-  number(table, entry, "states");
+  count(table, entry, "states");
   number(table, entry, "output_jump");
   number(table, entry, "energy_before");
   number(table, entry, "energy_after");

@@ -193,6 +193,63 @@ static void modes_may_change(void **state) {
   e2e_daemon_end(&daemon);
 }
 
+static bool paused_by_overrun(const plantbus_PlantStatus *s) {
+  return s->mode == plantbus_PAUSED && s->overruns > 0;
+}
+
+// A thousand times ten thousand steps a second cannot be kept: the plant is paused, told by an
+// event.
+static void the_policy_stop_pauses_the_plant(void **state) {
+  (void)state;
+  char message[320];
+  e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, NULL);
+  pb_session *session = e2e_open(&daemon);
+  const e2e_raw raw = e2e_raw_join(&daemon);
+  const dds_entity_t events = e2e_raw_reader(&raw, PB_TOPIC_EVENT);
+  const dds_entity_t status = e2e_raw_reader(&raw, PB_TOPIC_STATUS);
+  e2e_refused(session, "set_mode", "{\"mode\":\"realtime\",\"overrun\":\"wait\"}", "/overrun",
+              "skip");
+  e2e_request(session, "set_mode", "{\"mode\":\"realtime\",\"speed\":1000,\"overrun\":\"stop\"}");
+  e2e_event_wait(events, "overrun", message);
+  assert_non_null(strstr(message, "a deadline was missed"));
+  plantbus_PlantStatus *s = e2e_status_wait(status, paused_by_overrun);
+  assert_string_equal(s->overrun_policy, "stop");
+  plantbus_PlantStatus_free(s, DDS_FREE_ALL);
+  e2e_request(session, "step", "{\"n\":5}");
+  dds_delete(raw.participant);
+  pb_session_close(session);
+  e2e_daemon_end(&daemon);
+}
+
+static bool has_run(const plantbus_PlantStatus *s) {
+  return s->jitter.count > 1000;
+}
+
+static void the_status_has_times_and_ages(void **state) {
+  (void)state;
+  const char *const realtime[] = {"--mode", "realtime", "--overrun", "skip", NULL};
+  e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, realtime);
+  pb_session *session = e2e_open(&daemon);
+  const e2e_raw raw = e2e_raw_join(&daemon);
+  const dds_entity_t status = e2e_raw_reader(&raw, PB_TOPIC_STATUS);
+  e2e_attach(session, "test", "Va", 0.0);
+  watch w = {.want = 3000};
+  run(session, &w, 2.0);
+  plantbus_PlantStatus *s = e2e_status_wait(status, has_run);
+  uint64_t steps = 0, waits = 0;
+  for (int i = 0; i < 64; i++) steps += s->step_time.bin[i], waits += s->jitter.bin[i];
+  assert_true(steps >= s->step_time.count && waits >= s->jitter.count);
+  assert_true(s->step_time.sum > 0.0 && s->step_time.largest > 0.0);
+  assert_string_equal(s->overrun_policy, "skip");
+  assert_non_null(strstr(s->real_time, "denormals: flushed to zero"));
+  assert_int_equal(s->attached._length, 1);
+  assert_true(s->attached._buffer[0].age_max <= s->step);
+  plantbus_PlantStatus_free(s, DDS_FREE_ALL);
+  dds_delete(raw.participant);
+  pb_session_close(session);
+  e2e_daemon_end(&daemon);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(the_plant_runs_at_its_rate),
@@ -201,6 +258,8 @@ int main(void) {
       cmocka_unit_test(lockstep_begins_where_the_plant_is),
       cmocka_unit_test(a_late_command_is_counted_once),
       cmocka_unit_test(modes_may_change),
+      cmocka_unit_test(the_policy_stop_pauses_the_plant),
+      cmocka_unit_test(the_status_has_times_and_ages),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
