@@ -94,8 +94,11 @@ static pb_status matrix_read(const cJSON *body, const char *key, size_t rows, si
   return PB_OK;
 }
 
+// Without "a" the controller has no states, and needs neither b nor c.
 static pb_status states_read(const cJSON *body, size_t *states, pb_error *err) {
   const cJSON *a = pb_json_member(body, "a");
+  *states = 0;
+  if (!a && !pb_json_member(body, "b") && !pb_json_member(body, "c")) return PB_OK;
   if (!cJSON_IsArray(a))
     return pb_fail(err, PB_ERR_SCHEMA, "/a",
                    "expected an array of rows, empty for a controller without states");
@@ -155,10 +158,10 @@ pb_status pb_host_read_lti(const pb_host_reader *r, pb_error *err) {
   pb_lti given = {0};
   pb_status status = states_read(r->body, &nx, err);
   if (!status) status = pb_lti_new(nx, nu, ny, 0, &given, err);
-  if (!status) status = matrix_read(r->body, "a", nx, nx, true, given.a, err);
-  if (!status) status = matrix_read(r->body, "b", nx, nu, true, given.b, err);
-  if (!status) status = matrix_read(r->body, "c", ny, nx, true, given.c, err);
-  if (!status) status = matrix_read(r->body, "d", ny, nu, false, given.d, err);
+  if (!status) status = matrix_read(r->body, "a", nx, nx, nx > 0, given.a, err);
+  if (!status) status = matrix_read(r->body, "b", nx, nu, nx > 0, given.b, err);
+  if (!status) status = matrix_read(r->body, "c", ny, nx, nx > 0, given.c, err);
+  if (!status) status = matrix_read(r->body, "d", ny, nu, nx == 0, given.d, err);
   if (!status) status = make_discrete(r, &given, err);
   pb_lti_free(&given);
   return status;

@@ -328,7 +328,7 @@ static const refusal refused[] = {
     {C, "{" IFF ", 'gain': 1, 'highpass_hz': '1'}", "/highpass_hz", PB_ERR_SCHEMA},
     {C, "{" IFF ", 'gain': 1, 'a': []}", "/a", PB_ERR_SCHEMA},
     {C, "{" IFF ", 'gain': 1, 'Gain': 1}", "/Gain", PB_ERR_SCHEMA},
-    {C, "{" LTI "}", "/a", PB_ERR_SCHEMA},
+    {C, "{" LTI "}", "/d", PB_ERR_SCHEMA},
     {C, "{" LTI ", 'a': [[1, 2]], 'b': [[1]], 'c': [[1], [1]]}", "/a/0", PB_ERR_SCHEMA},
     {C, "{" LTI ", 'a': [[1, 2], [3, true]], 'b': [[1]], 'c': [[1], [1]]}", "/a/1/1",
      PB_ERR_SCHEMA},
