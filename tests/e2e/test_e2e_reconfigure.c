@@ -237,13 +237,8 @@ static char element[64];
 
 static int element_make(void **state) {
   (void)state;
-  // A slender round bar of steel, 14 mm long, with the masses of a flexible joint.
-  const beam bar = {
-      .length = 0.014, .ea = 1.4e6, .ei = 0.07, .gj = 3.6, .mass = 0.029, .polar_inertia = 1.5e-6};
-  double k[18 * 18], m[18 * 18], position[9];
   snprintf(element, sizeof element, "/tmp/pb-joint-%ld.mat", (long)getpid());
-  beam_chain(&bar, 2, k, m, position);
-  return beam_write(element, 3, 18, k, m, position);
+  return beam_joint_write(element);
 }
 
 static int element_remove(void **state) {

@@ -8,6 +8,7 @@
 #include "base/text.h"
 #include "control/loop.h"
 #include "model/model.h"
+#include "model/transfer.h"
 
 void *__real_malloc(size_t size);
 void *__real_calloc(size_t count, size_t size);
@@ -164,6 +165,34 @@ static pb_status loop_solver(const char *path, pb_error *err) {
   return st;
 }
 
+// A plant and a changed one with their maps, and the way from one to the other.
+static pb_status transfer(const char *path, pb_error *err) {
+  pb_model *from = NULL, *to = NULL;
+  pb_motion_map *from_map = NULL, *to_map = NULL;
+  pb_transfer *way = NULL;
+  pb_transfer_report report;
+  char *text = NULL, *canonical = NULL;
+  size_t length;
+  pb_status st = pb_text_read(path, &text, &length, err);
+  if (!st) st = pb_model_parse(text, length, NULL, NULL, &from, &from_map, &canonical, err);
+  if (!st) st = pb_model_parse(text, length, NULL, NULL, &to, &to_map, NULL, err);
+  if (!st) st = pb_transfer_new(from, from_map, to, to_map, &way, err);
+  if (!st) st = pb_transfer_examine(way, &report, err);
+  pb_transfer_free(way);
+  pb_motion_map_free(from_map);
+  pb_motion_map_free(to_map);
+  pb_model_free(from);
+  pb_model_free(to);
+  free(canonical);
+  free(text);
+  return st;
+}
+
+static void test_transfer(void **state) {
+  (void)state;
+  fail_each(transfer, PB_CONFIG "/plants/apa300ml-bench-electronics.json", "transfer");
+}
+
 static void test_loop(void **state) {
   (void)state;
   fail_each(loop_solver, PB_CONFIG "/plants/apa300ml-bench-electronics.json",
@@ -181,9 +210,13 @@ int main(void) {
   cJSON_Hooks hooks = {__wrap_malloc, free};
   cJSON_InitHooks(&hooks);
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_bench),   cmocka_unit_test(test_bench_electronics),
-      cmocka_unit_test(test_hexapod), cmocka_unit_test(test_elements),
-      cmocka_unit_test(test_loop),    cmocka_unit_test(test_pack_and_truncate),
+      cmocka_unit_test(test_bench),
+      cmocka_unit_test(test_bench_electronics),
+      cmocka_unit_test(test_hexapod),
+      cmocka_unit_test(test_elements),
+      cmocka_unit_test(test_transfer),
+      cmocka_unit_test(test_loop),
+      cmocka_unit_test(test_pack_and_truncate),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

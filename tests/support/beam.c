@@ -85,3 +85,11 @@ int beam_write(const char *path, size_t frames, size_t size, const double *k, co
   free(xyz);
   return failed ? -1 : 0;
 }
+
+int beam_joint_write(const char *path) {
+  const beam bar = {
+      .length = 0.014, .ea = 1.4e6, .ei = 0.07, .gj = 3.6, .mass = 0.029, .polar_inertia = 1.5e-6};
+  double k[18 * 18], m[18 * 18], position[9];
+  beam_chain(&bar, 2, k, m, position);
+  return beam_write(path, 3, 18, k, m, position);
+}

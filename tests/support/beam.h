@@ -21,4 +21,8 @@ void beam_chain(const beam *whole, size_t parts, double *k, double *m, double *p
 int beam_write(const char *path, size_t frames, size_t size, const double *k, const double *m,
                const double *position);
 
+// A slender bar 14 mm long with the mass of a flexible joint, of three frames and 18 coordinates,
+// as such a file. 0 or −1.
+int beam_joint_write(const char *path);
+
 #endif

@@ -184,12 +184,8 @@ static char element[64];
 
 static int element_make(void **state) {
   (void)state;
-  const beam bar = {
-      .length = 0.014, .ea = 1.4e6, .ei = 0.07, .gj = 3.6, .mass = 0.029, .polar_inertia = 1.5e-6};
-  double k[18 * 18], m[18 * 18], position[9];
   snprintf(element, sizeof element, "/tmp/pb-transfer-%ld.mat", (long)getpid());
-  beam_chain(&bar, 2, k, m, position);
-  return beam_write(element, 3, 18, k, m, position);
+  return beam_joint_write(element);
 }
 
 static int element_remove(void **state) {
