@@ -1,6 +1,6 @@
 #!/bin/sh
-# Installs what is missing, builds, and runs every test, then the library's and the daemon's tests again
-# under AddressSanitizer and UndefinedBehaviorSanitizer.
+# Installs what is missing, builds, and runs every test, then all of them again under AddressSanitizer and
+# UndefinedBehaviorSanitizer, and the step thread under ThreadSanitizer.
 # Usage: ./test.sh [--release-only]
 set -eu
 cd "$(dirname "$0")"
@@ -14,3 +14,8 @@ ctest --preset release -j2
 cmake --preset sanitize >/dev/null
 cmake --build --preset sanitize
 ctest --preset sanitize -j2
+
+# The middleware cannot be watched so; the rings and the step thread need none of it.
+cmake --preset threads >/dev/null
+cmake --build --preset threads
+ctest --preset threads
