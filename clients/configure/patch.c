@@ -170,8 +170,12 @@ static pb_status make(const cJSON *value_now, const char *at, const char *pointe
     return pb_fail(err, PB_ERR_REFERENCE, pointer, "its parent is neither object nor array");
   pb_status status = token_next(&at, pointer, token, err);
   if (status) return status;
+  // Objects on the way that the file lacks are made: what a template expands to is changed so. The
+  // daemon judges the file that results.
+  static const cJSON nothing = {.type = cJSON_Object};
   const cJSON *child = pb_json_member(value_now, token);
-  if (*at && !child) return fail_missing(err, pointer, at);
+  if (*at && !child && cJSON_IsNull(value)) return fail_missing(err, pointer, at);
+  if (*at && !child) child = &nothing;
   status = *at ? make(child, at, pointer, value, &inner, err)
                : difference(child, value, pointer, &inner, err);
   if (status) return status;

@@ -54,6 +54,8 @@ static void values_in_objects(void **state) {
   check("/models/m/new", "\"x\"", "{\"models\":{\"m\":{\"new\":\"x\"}}}");
   check("/a~1b/~0", "4", "{\"a/b\":{\"~\":4}}");
   check("/models/m/k", "null", "{\"models\":{\"m\":{\"k\":null}}}");
+  check("/components/strut3/k_1", "6e5", "{\"components\":{\"strut3\":{\"k_1\":600000}}}");
+  check("/models/m/deep/x/y", "1", "{\"models\":{\"m\":{\"deep\":{\"x\":{\"y\":1}}}}}");
 }
 
 // A merge would keep c and deep/a of the old ones.
@@ -78,8 +80,8 @@ static void elements_are_sent_with_their_array(void **state) {
 
 static void what_is_not_there_is_told(void **state) {
   (void)state;
-  check_fails("/modls/m/k", "1", PB_ERR_REFERENCE, "/modls");
-  check_fails("/models/m/deep/x/y", "1", PB_ERR_REFERENCE, "/models/m/deep/x");
+  check_fails("/modls/m/k", "null", PB_ERR_REFERENCE, "/modls");
+  check_fails("/models/m/deep/x/y", "null", PB_ERR_REFERENCE, "/models/m/deep/x");
   check_fails("/inputs/2/name", "1", PB_ERR_REFERENCE, "/inputs/2");
   check_fails("/inputs/01/name", "1", PB_ERR_REFERENCE, "/inputs/01");
   check_fails("/inputs/3", "1", PB_ERR_REFERENCE, "/inputs/3");

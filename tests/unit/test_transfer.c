@@ -143,6 +143,8 @@ static void parameters_change_and_motion_does_not(void **state) {
       "{\"template\":{\"payload\":{\"mass\":25}}}",
       "{\"template\":{\"payload\":{\"mass\":25,\"center_height\":0.25}}}",
       "{\"models\":{\"apa300ml\":{\"c_1\":500}}}",
+      "{\"components\":{\"strut3\":{\"k_1\":600000}}}",
+      "{\"connections\":{\"bottom_joint2\":{\"joint\":{\"model\":\"bottom\",\"k_f\":30}}}}",
   };
   for (size_t i = 0; i < sizeof patches / sizeof *patches; i++) {
     side a = side_patched("nano-hexapod", "{}"), b = side_patched("nano-hexapod", patches[i]);
