@@ -121,7 +121,7 @@ void pb_bus_realtime_stop(pb_daemon *d) {
   if (pb_realtime_changed(&d->realtime)) pb_bus_change_made(d);
   pb_realtime_change(&d->realtime, NULL);
   atomic_store_explicit(&d->realtime_mode, false, memory_order_release);
-  pb_bus_change_due(d);  // a change that the step thread did not come to
+  pb_bus_change_due(d);           // a change that the step thread did not come to
   pb_bus_take_commands(d, NULL);  // what came while the threads ended
   pthread_mutex_unlock(&d->lock);
 }

@@ -13,9 +13,9 @@
 static const int64_t answer_ns = 800000000;  // each request is answered within 1 s
 
 static void pending_clear(pb_pending *p) {
-  // After a change the pointers hold what it replaced.
+  // Before a change the pointers hold what it brings, after it what it replaced.
   pb_host_free(p->change.swaps_host ? p->change.host : NULL);
-  if (p->made && p->change.model) free(p->change.state);
+  if (p->change.model) free(p->change.state);
   pb_compile_clear(&p->job);
   free(p->patch);
   free(p->comment);
@@ -269,6 +269,7 @@ void pb_configure_tend(pb_daemon *d) {
     p->compiling = false;
     pb_status status = p->job.status;
     if (status) err = p->job.err;
+    if (!status && p->cancelled) status = pb_fail(&err, PB_ERR_STATE, "", "was cancelled");
     if (!status) status = model_arm(d, &err);
     if (status) {
       model_failed(d, &err);
@@ -286,6 +287,32 @@ void pb_configure_tend(pb_daemon *d) {
     answer(d, "accepted", &none, "{}");
 }
 
+// Takes an armed change back; false: whoever steps has it already.
+static bool disarm(pb_daemon *d) {
+  pb_pending *p = &d->pending;
+  pthread_mutex_lock(&d->lock);
+  bool taken = p->armed;
+  if (taken && d->engine.drive == PB_DRIVE_REALTIME) taken = pb_realtime_revoke(&d->realtime);
+  if (taken) p->armed = false;
+  pthread_mutex_unlock(&d->lock);
+  return taken;
+}
+
+pb_status pb_configure_cancel(pb_daemon *d, pb_error *err) {
+  pb_pending *p = &d->pending;
+  pb_error why;
+  if (!p->used || !p->is_model)
+    return pb_fail(err, PB_ERR_STATE, "", "no change of the model is on its way");
+  if (p->compiling) {
+    p->cancelled = true;
+    return PB_OK;
+  }
+  if (!disarm(d)) return pb_fail(err, PB_ERR_STATE, "", "the change is made already");
+  pb_fail(&why, PB_ERR_STATE, "", "was cancelled");
+  model_failed(d, &why);
+  return PB_OK;
+}
+
 // A thread that compiles cannot be stopped; what it works on is then left to the end of the
 // process.
 bool pb_configure_end(pb_daemon *d) {
@@ -298,7 +325,6 @@ bool pb_configure_end(pb_daemon *d) {
   if (!p->used) return true;
   if (p->compiling && !atomic_load(&p->job.done)) return false;
   if (p->compiling) pb_compile_join(&p->job);
-  if (!p->made && p->change.model) free(p->change.state);
   if (p->made && p->is_model) {
     pb_revision_free((pb_revision *)p->job.before);
     p->job.next = NULL;

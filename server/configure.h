@@ -56,6 +56,7 @@ typedef struct pb_pending {
   int64_t answer_by;  // wall clock: "accepted" then
   bool answered;
   bool is_model;
+  bool cancelled;  // while it was compiled
   uint64_t at_step;
   pb_compile_job job;
   char *patch, *comment;                 // of the request; patch NULL: a revert

@@ -196,6 +196,9 @@ pb_status pb_configure_begin(pb_daemon *daemon, struct pb_request *request,
                              const pb_configure_order *order, pb_error *err);
 pb_status pb_configure_host(pb_daemon *daemon, struct pb_request *request, pb_host *host,
                             const char *channel, bool removed, uint64_t period);
+// Gives up a change of the model that is compiled or waits for its step. PB_ERR_STATE: there is
+// none.
+pb_status pb_configure_cancel(pb_daemon *daemon, pb_error *err);
 void pb_configure_tend(pb_daemon *daemon);
 void pb_configure_first(pb_daemon *daemon);  // revision 1 into the history
 bool pb_configure_end(pb_daemon *daemon);
@@ -248,6 +251,7 @@ pb_status pb_request_reset(pb_daemon *daemon, pb_request *request, pb_error *err
 pb_status pb_request_snapshot(pb_daemon *daemon, pb_request *request, pb_error *err);
 pb_status pb_request_restore(pb_daemon *daemon, pb_request *request, pb_error *err);
 pb_status pb_request_configure(pb_daemon *daemon, pb_request *request, pb_error *err);
+pb_status pb_request_cancel(pb_daemon *daemon, pb_request *request, pb_error *err);
 pb_status pb_request_revert(pb_daemon *daemon, pb_request *request, pb_error *err);
 pb_status pb_request_history(pb_daemon *daemon, pb_request *request, pb_error *err);
 pb_status pb_request_get_revision(pb_daemon *daemon, pb_request *request, pb_error *err);

@@ -80,6 +80,8 @@ static void scheduling_ask(pb_realtime *rt) {
 static void change_make(pb_realtime *rt, step_run *run) {
   pb_change *change = atomic_load_explicit(&rt->change, memory_order_acquire);
   if (!change || rt->stepper->state->step < change->at_step) return;
+  // Taken out before it is made: it may be revoked up to here.
+  if (!atomic_compare_exchange_strong(&rt->change, &change, NULL)) return;
   if (change->model) {
     run->former_revision = rt->stepper->revision;
     memcpy(run->input_from, change->input_from, sizeof run->input_from);
@@ -87,7 +89,6 @@ static void change_make(pb_realtime *rt, step_run *run) {
   const bool model = change->model != NULL;
   pb_stepper_change(rt->stepper, change);
   if (model) inputs_relayout(run->input_from, rt->stepper->model->nu, run->held.u);
-  atomic_store_explicit(&rt->change, NULL, memory_order_relaxed);
   atomic_store_explicit(&rt->changed, change, memory_order_release);
   sem_post(&rt->published);
 }
@@ -202,6 +203,10 @@ bool pb_realtime_input(pb_realtime *realtime, const pb_held_input *input) {
 
 void pb_realtime_change(pb_realtime *realtime, pb_change *change) {
   atomic_store_explicit(&realtime->change, change, memory_order_release);
+}
+
+bool pb_realtime_revoke(pb_realtime *realtime) {
+  return atomic_exchange_explicit(&realtime->change, NULL, memory_order_acq_rel) != NULL;
 }
 
 pb_change *pb_realtime_changed(pb_realtime *realtime) {

@@ -83,6 +83,9 @@ bool pb_realtime_input(pb_realtime *realtime, const pb_held_input *input);
 // made. One at a time. [any]
 void pb_realtime_change(pb_realtime *realtime, pb_change *change);
 
+// Takes a change back that is not made yet; false: it is. [any]
+bool pb_realtime_revoke(pb_realtime *realtime);
+
 // The change that was made since the last call, or NULL. [any]
 pb_change *pb_realtime_changed(pb_realtime *realtime);
 

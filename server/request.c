@@ -20,6 +20,7 @@ static const struct {
              {"snapshot", pb_request_snapshot},
              {"restore", pb_request_restore},
              {"configure", pb_request_configure},
+             {"cancel_configure", pb_request_cancel},
              {"revert", pb_request_revert},
              {"history", pb_request_history},
              {"get_revision", pb_request_get_revision},

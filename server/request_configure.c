@@ -79,6 +79,12 @@ pb_status pb_request_configure(pb_daemon *d, pb_request *request, pb_error *err)
   return status;
 }
 
+pb_status pb_request_cancel(pb_daemon *d, pb_request *request, pb_error *err) {
+  static const char *const keys[] = {NULL};
+  pb_status status = pb_body_known(request->body, keys, err);
+  return status ? status : pb_configure_cancel(d, err);
+}
+
 static const pb_history_entry *history_find(const pb_daemon *d, uint32_t revision) {
   for (uint32_t i = 0; i < d->history_count && i < PB_CONFIGURE_HISTORY; i++)
     if (d->history[i].revision == revision) return &d->history[i];

@@ -29,7 +29,8 @@ static const char description[] =
     "  set POINTER VALUE   one value: JSON, or a bare string; null removes a member\n"
     "  patch FILE|-        a JSON merge patch (RFC 7396) of the plant file\n"
     "  history             the revisions\n"
-    "  revert REVISION     the plant file of an earlier revision, as a new revision\n\n"
+    "  revert REVISION     the plant file of an earlier revision, as a new revision\n"
+    "  cancel              gives up a change that is compiled or waits for its step\n\n"
     "Exit codes: 0 done, 1 failed or refused, 2 wrong command line.\n\n"
     "Examples:\n"
     "  plantbus-configure get /components/mass/mass\n"
@@ -40,10 +41,12 @@ static const char description[] =
 static const struct {
   const char *name;
   int least, most;
-} commands[] = {{"get", 0, 1}, {"set", 2, 2}, {"patch", 1, 1}, {"history", 0, 0}, {"revert", 1, 1}};
+} commands[] = {{"get", 0, 1},     {"set", 2, 2},    {"patch", 1, 1},
+                {"history", 0, 0}, {"revert", 1, 1}, {"cancel", 0, 0}};
 
 static void check_words(struct argp_state *state, const configure_options *o) {
-  if (!o->command) argp_error(state, "a command is missing: get, set, patch, history or revert");
+  if (!o->command)
+    argp_error(state, "a command is missing: get, set, patch, history, revert or cancel");
   const int words = (o->first != NULL) + (o->second != NULL);
   for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
     if (strcmp(commands[i].name, o->command) != 0) continue;
@@ -129,6 +132,8 @@ static pb_status run_command(const configure_options *o, pb_session *session, pb
     status = configure_patch(o, session, plant, err);
   else if (strcmp(o->command, "history") == 0)
     status = configure_history(o, session, err);
+  else if (strcmp(o->command, "cancel") == 0)
+    status = pb_session_request(session, "cancel_configure", NULL, o->timeout, NULL, err);
   else
     status = configure_revert(o, session, err);
   cJSON_Delete(plant);
@@ -151,7 +156,7 @@ int main(int argc, char **argv) {
   static const struct argp argp = {
       option_table,
       parse,
-      "get [POINTER]\nset POINTER VALUE\npatch FILE|-\nhistory\nrevert REVISION",
+      "get [POINTER]\nset POINTER VALUE\npatch FILE|-\nhistory\nrevert REVISION\ncancel",
       description,
       children,
       NULL,

@@ -100,6 +100,32 @@ static void an_input_in_use_stays(void **state) {
   e2e_daemon_end(&daemon);
 }
 
+// A change that waits for its step keeps others waiting, and can be given up, in every mode.
+static void a_waiting_change_can_be_cancelled(void **state) {
+  (void)state;
+  static const char *const modes[] = {"{\"mode\":\"paused\"}", "{\"mode\":\"realtime\"}"};
+  e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, paused);
+  pb_session *session = e2e_open(&daemon);
+  const e2e_raw raw = e2e_raw_join(&daemon);
+  const dds_entity_t events = e2e_raw_reader(&raw, PB_TOPIC_EVENT);
+  char message[320];
+  e2e_refused(session, "cancel_configure", "{}", "", "no change of the model");
+  for (int i = 0; i < 2; i++) {
+    e2e_request(session, "set_mode", modes[i]);
+    e2e_request(session, "configure",
+                "{\"patch\":{\"components\":{\"mass\":{\"mass\":9}}},\"at_step\":9000000000}");
+    e2e_refused(session, "configure", "{\"patch\":{}}", "", "waits for its step");
+    e2e_request(session, "cancel_configure", "{}");
+    e2e_event_wait(events, "configure_failed", message);
+    assert_non_null(strstr(message, "was cancelled"));
+    assert_true(e2e_number(session, "ping", NULL, "revision") == 1.0 + i);
+    assert_true(e2e_number(session, "configure", "{\"patch\":{}}", "revision") == 2.0 + i);
+  }
+  dds_delete(raw.participant);
+  pb_session_close(session);
+  e2e_daemon_end(&daemon);
+}
+
 enum { STEPS = 400, CHANGE = 150 };
 
 typedef struct track {
@@ -283,6 +309,7 @@ int main(void) {
       cmocka_unit_test(a_patch_makes_a_revision),
       cmocka_unit_test(what_is_refused_leaves_all_as_it_was),
       cmocka_unit_test(an_input_in_use_stays),
+      cmocka_unit_test(a_waiting_change_can_be_cancelled),
       cmocka_unit_test(the_swap_is_at_its_step),
       cmocka_unit_test(a_run_never_mixes_revisions),
       cmocka_unit_test(identify_never_averages_across_revisions),
