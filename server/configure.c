@@ -143,9 +143,10 @@ static void history_add(pb_daemon *d, const pb_pending *p, const pb_transfer_rep
   e->output_jump = report->output_jump;
   e->energy_before = report->energy_before;
   e->energy_after = report->energy_after;
-  if (report->worst_output >= 0)
-    snprintf(e->worst_output, sizeof e->worst_output, "%s",
-             r->model->output[report->worst_output].name);
+  if (report->worst_output < 0) return;
+  const pb_signal *worst = &r->model->output[report->worst_output];
+  snprintf(e->worst_output, sizeof e->worst_output, "%s", worst->name);
+  snprintf(e->worst_unit, sizeof e->worst_unit, "%s", worst->unit);
 }
 
 void pb_configure_first(pb_daemon *d) {
@@ -177,10 +178,10 @@ static void model_told(pb_daemon *d) {
   pthread_mutex_lock(&d->lock);
   pb_engine_note(&d->engine, PB_EVENT_RECONFIGURED,
                  "revision %u at step %llu, asked for by '%s': %llu states, compiled in %.3g s; "
-                 "largest jump of an output %.3g (%s), energy %.6g J before and %.6g J after",
+                 "largest jump of an output %.3g %s (%s), energy %.6g J before and %.6g J after",
                  e->revision, (unsigned long long)e->step, e->client_name,
-                 (unsigned long long)e->states, p->job.seconds, e->output_jump, e->worst_output,
-                 e->energy_before, e->energy_after);
+                 (unsigned long long)e->states, p->job.seconds, e->output_jump, e->worst_unit,
+                 e->worst_output, e->energy_before, e->energy_after);
   pthread_mutex_unlock(&d->lock);
   pb_log("plantbusd: revision %u at step %llu (%s): %llu states", e->revision,
          (unsigned long long)e->step, e->client_name, (unsigned long long)e->states);

@@ -78,7 +78,7 @@ typedef struct pb_history_entry {
   char *comment, *patch, *text;
   char sha256[65];
   double output_jump, energy_before, energy_after;
-  char worst_output[PB_CONFIGURE_NAME];
+  char worst_output[PB_CONFIGURE_NAME], worst_unit[16];
 } pb_history_entry;
 
 #endif

@@ -1,21 +1,19 @@
 #!/bin/sh
 # Soaks a daemon: four clients that are killed and stopped at random, joints that change between springs and
 # elements every second, requests of all kinds and hostile ones. Builds nothing: uses build/bin, build/tests.
-# Usage: tests/soak.sh [--build DIR] [--seed N] [--must-configure] MINUTES
+# Usage: tests/soak.sh [--build DIR] [--seed N] MINUTES
 set -eu
 top=$(cd "$(dirname "$0")/.." && pwd)
 build=$top/build
 seed=
-configure=
 usage() {
-  echo "usage: tests/soak.sh [--build DIR] [--seed N] [--must-configure] MINUTES" >&2
+  echo "usage: tests/soak.sh [--build DIR] [--seed N] MINUTES" >&2
   exit 2
 }
 while [ $# -gt 1 ]; do
   case $1 in
     --build) build=$2; shift 2 ;;
     --seed) seed=$2; shift 2 ;;
-    --must-configure) configure=--must-configure; shift ;;
     *) usage ;;
   esac
 done
@@ -42,7 +40,7 @@ trap 'exit 143' TERM
 export ASAN_OPTIONS="${ASAN_OPTIONS:+$ASAN_OPTIONS:}quarantine_size_mb=8"
 "$build/tests/soak_plants" "$top/config/plants/nano-hexapod.json" "$work"
 "$build/tests/soak_driver" --bin "$build/bin" --client "$build/tests/soak_client" --directory "$work" \
-  --seconds "$seconds" ${seed:+--seed "$seed"} $configure &
+  --seconds "$seconds" ${seed:+--seed "$seed"} --must-configure &
 driver=$!
 code=0
 wait "$driver" || code=$?

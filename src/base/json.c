@@ -208,10 +208,12 @@ pb_status pb_json_print_compact(const cJSON *value, char **out, pb_error *err) {
 // Sets object[key] in place of what is there, so that the order of keys stays. Takes `value` over.
 static bool set_member(cJSON *object, const char *key, cJSON *value) {
   bool ok = value != NULL;
-  if (ok && pb_json_member(object, key))
+  if (ok && pb_json_member(object, key)) {
     ok = cJSON_ReplaceItemInObjectCaseSensitive(object, key, value);
-  else if (ok)
+    if (ok) return value->string != NULL;  // cJSON up to 1.7.15 replaces without its key's memory
+  } else if (ok) {
     ok = cJSON_AddItemToObject(object, key, value);
+  }
   if (!ok) cJSON_Delete(value);
   return ok;
 }

@@ -134,29 +134,32 @@ void pb_transfer_apply(pb_transfer *t, const pb_state *before, pb_state *after) 
   memcpy(t->after, after, pb_state_bytes(t->to));
 }
 
-// Outputs of the plant itself: y = C x + D u.
-static void outputs(const pb_model *m, const pb_state *s, double *y) {
-  memset(y, 0, m->ny * sizeof *y);
-  add_columns(m->ny, m->nx, m->c, s->data, y);
-  add_columns(m->ny, m->nu, m->d, s->data + m->nx, y);
+// Output o of the plant itself, y = C x + D u, and the sum of the magnitudes that it adds up from.
+static double output_of(const pb_model *m, const pb_state *s, size_t o, double *size) {
+  double sum = 0.0;
+  for (size_t j = 0; j < m->nx + m->nu; j++) {
+    const double *a = j < m->nx ? m->c + j * m->ny : m->d + (j - m->nx) * m->ny;
+    sum += a[o] * s->data[j];
+    *size += fabs(a[o] * s->data[j]);
+  }
+  return sum;
 }
 
 pb_status pb_transfer_examine(const pb_transfer *t, pb_transfer_report *out, pb_error *err) {
   const pb_state *a = t->before, *b = t->after;
-  double *y = malloc((t->from->ny + t->to->ny) * sizeof *y);
+  double worst = -1.0;
   *out = (pb_transfer_report){.worst_output = -1};
-  if (!y) return pb_fail_memory(err, "transfer");
-  double *now = y + t->from->ny;
-  outputs(t->from, a, y);
-  outputs(t->to, b, now);
   for (size_t o = 0; o < t->to->ny; o++) {
     if (t->output_from[o] < 0) continue;
-    const double jump = fabs(now[o] - y[t->output_from[o]]);
-    if (out->worst_output >= 0 && !(jump > out->output_jump)) continue;
+    double size = 0.0;
+    const double jump = fabs(output_of(t->to, b, o, &size) -
+                             output_of(t->from, a, (size_t)t->output_from[o], &size));
+    const double part = size > 0.0 ? jump / size : 0.0;
+    if (part <= worst) continue;
+    worst = part;
     out->output_jump = jump;
     out->worst_output = (int)o;
   }
-  free(y);
   pb_status st =
       pb_motion_map_energy(t->from_map, a->data, a->data + t->from->nx, &out->energy_before, err);
   if (!st)

@@ -23,9 +23,10 @@ typedef struct pb_transfer {
 
 typedef struct pb_transfer_report {
   double energy_before, energy_after;  // J, kinetic and strain
-  double output_jump;                  // largest |y' − y| of the outputs that both plants have,
-                                       // before delays, noise and quantisation
-  int worst_output;                    // of the new plant; −1: none in common
+  double output_jump;  // |y' − y| of the worst output, in its unit, before delays, noise and
+                       // quantisation
+  int worst_output;    // of the new plant: the largest jump beside the magnitudes that the output
+                       // adds up from, as volts and metres do not compare; −1: none in common
 } pb_transfer_report;
 
 // Prepares the transfer between two compiled plants, which must outlive it. PB_ERR_STATE when one
