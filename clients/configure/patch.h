@@ -18,9 +18,9 @@ pb_status pb_pointer_find(const cJSON *document, const char *pointer, const cJSO
                           pb_error *err);
 
 // The merge patch after which `value` stands at the pointer. Objects on the way that are not there
-// are made (a template's "/components/strut3/k_1" is not in the file before it is changed); the last
-// part may be "-" or the length of an array to append. value null removes a member, whose parents
-// must be there. *out is owned by the caller (cJSON_Delete). Fails as pb_pointer_find, with
+// are made (a template's "/components/strut3/k_1" is not in the file before it is changed); the
+// last part may be "-" or the length of an array to append. value null removes a member, whose
+// parents must be there. *out is owned by the caller (cJSON_Delete). Fails as pb_pointer_find, with
 // PB_ERR_ARGUMENT (the whole document; a null inside an object, which a merge patch cannot say) and
 // PB_ERR_MEMORY. [init]
 pb_status pb_patch_make(const cJSON *document, const char *pointer, const cJSON *value, cJSON **out,
