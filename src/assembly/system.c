@@ -34,12 +34,14 @@ static pb_status extend(pb_stack_equations *s, pb_error *err) {
 }
 
 static pb_status stack_keep(const pb_stack_equations *s, pb_system_stack *kept, pb_error *err) {
-  const size_t bytes = s->n * s->n * sizeof(double);
+  const size_t bytes = s->n * s->n * sizeof(double), forces = s->n * s->nu * sizeof(double);
   kept->m = malloc(bytes);
   kept->k = malloc(bytes);
-  if (!kept->m || !kept->k) return pb_fail_memory(err, "/components");
+  kept->f = malloc(forces);
+  if (!kept->m || !kept->k || !kept->f) return pb_fail_memory(err, "/components");
   memcpy(kept->m, s->m, bytes);
   memcpy(kept->k, s->k, bytes);
+  memcpy(kept->f, s->f, forces);
   return PB_OK;
 }
 

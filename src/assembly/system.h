@@ -31,6 +31,7 @@ typedef struct pb_system {
 typedef struct pb_system_stack {
   pb_layout layout;
   double *m, *k;  // layout.size squared
+  double *f;      // layout.size × inputs of the plant
 } pb_system_stack;
 
 // Assembles. [init] Fails with PB_ERR_SINGULAR (a massless motion without stiffness, naming its
@@ -41,7 +42,8 @@ pb_status pb_system_assemble(const pb_plant *plant, pb_warnings *warnings, pb_sy
 
 // The same with each stacked coordinate as two more outputs (all q_i, then all q̇_i) and two more
 // inputs (a displacement of each, then an impulse on each), after the plant's own. *stack is the
-// caller's: layout (pb_layout_clear), m and k (free). [init]
+// caller's: layout (pb_layout_clear), m, k and f (free).
+// [init]
 pb_status pb_system_assemble_extended(const pb_plant *plant, pb_warnings *warnings, pb_system **out,
                                       pb_system_stack *stack, pb_error *err);
 

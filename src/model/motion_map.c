@@ -15,6 +15,7 @@ void pb_motion_map_free(pb_motion_map *map) {
   pb_layout_clear(&map->layout);
   free(map->m);
   free(map->k);
+  free(map->f);
   free(map->cq);
   free(map->cv);
   free(map->dq);
@@ -54,6 +55,7 @@ static pb_status extended_compile(pb_plant *plant, pb_warnings *warnings, pb_mod
   map->n = stack.layout.size;
   map->m = stack.m;
   map->k = stack.k;
+  map->f = stack.f;
   if (!st) st = pb_model_compile(system, warnings, &extended, err);
   pb_system_free(system);
   if (!st) st = map_fill(extended, map, err);

@@ -22,6 +22,7 @@ typedef struct pb_motion_map {
   pb_layout layout;  // where the coordinates of each component start in q
   size_t n, nx, nu;  // coordinates; states and inputs of the model
   double *m, *k;     // n × n: stacked mass and stiffness
+  double *f;         // n × nu: forces of the inputs on the coordinates
   double *cq, *cv;   // n × nx
   double *dq;        // n × nu
   double *bq, *bv;   // nx × n

@@ -17,6 +17,7 @@ static void multiply(size_t m, size_t n, size_t k, double alpha, const double *a
 
 // Work space of the preparation; nq old, nr new coordinates.
 typedef struct work {
+  double *lu;       // nr × nu'
   double *l;        // nr × nq
   double *bm;       // nx' × nr: B M'
   double *bml;      // nx' × nq
@@ -25,6 +26,7 @@ typedef struct work {
 
 static void work_clear(work *w) {
   free(w->l);
+  free(w->lu);
   free(w->bm);
   free(w->bml);
   free(w->static_);
@@ -38,14 +40,16 @@ static void add_part(const pb_transfer *t, work *w, const double *b, const doubl
   multiply(to->nx, from->nx, from->n, 1.0, w->bml, c, 1.0, t->x);
 }
 
-// What inputs hold statically without states: U = B_q M' (L D_q − D_q').
+// What inputs hold statically, without states or inside what is new: U = B_q M' (L D_q − D_q' +
+// L_u).
 static void add_static(const pb_transfer *t, work *w) {
   const pb_motion_map *from = t->from_map, *to = t->to_map;
   multiply(to->nx, from->nu, from->n, 1.0, w->bml, from->dq, 0.0, t->u);
   for (size_t i = 0; i < to->nu; i++) {
     if (t->input_from[i] < 0) continue;
-    memcpy(w->static_ + (size_t)t->input_from[i] * to->n, to->dq + i * to->n,
-           to->n * sizeof *w->static_);
+    for (size_t r = 0; r < to->n; r++)
+      w->static_[r + (size_t)t->input_from[i] * to->n] =
+          to->dq[r + i * to->n] - w->lu[r + i * to->n];
   }
   multiply(to->nx, from->nu, to->n, -1.0, w->bm, w->static_, 1.0, t->u);
 }
@@ -53,7 +57,7 @@ static void add_static(const pb_transfer *t, work *w) {
 static pb_status matrices_make(pb_transfer *t, pb_error *err) {
   const pb_motion_map *from = t->from_map, *to = t->to_map;
   work w = {0};
-  pb_status st = pb_transfer_coordinates(from, to, &w.l, err);
+  pb_status st = pb_transfer_coordinates(from, to, &w.l, &w.lu, err);
   w.bm = malloc(to->nx * to->n * sizeof(double));
   w.bml = malloc(to->nx * from->n * sizeof(double));
   w.static_ = calloc(to->n * from->nu + 1, sizeof(double));

@@ -42,8 +42,10 @@ void pb_transfer_apply(pb_transfer *transfer, const pb_state *before, pb_state *
 // What the last apply did. Fails with PB_ERR_MEMORY. [init]
 pb_status pb_transfer_examine(const pb_transfer *transfer, pb_transfer_report *out, pb_error *err);
 
-// The new plant's coordinates by the old one's: out is to->n × from->n, the caller's (free). [init]
-pb_status pb_transfer_coordinates(const pb_motion_map *from, const pb_motion_map *to, double **out,
-                                  pb_error *err);
+// The new plant's coordinates by the old one's and by the new plant's inputs, which deform what is
+// new inside a component: q' = L q + L_u u'. l is to->n × from->n, lu is to->n × to->nu, both the
+// caller's (free). [init]
+pb_status pb_transfer_coordinates(const pb_motion_map *from, const pb_motion_map *to, double **l,
+                                  double **lu, pb_error *err);
 
 #endif

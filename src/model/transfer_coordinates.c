@@ -13,6 +13,7 @@
 typedef struct carrier {
   const pb_motion_map *old, *now;
   double *l;     // now->n rows of old->n
+  double *lu;    // now->n rows of now->nu
   bool *known;   // [components of now] has its rows
   double *row;   // [6][old->n]: a motion under work
   double *next;  // the same again
@@ -115,7 +116,8 @@ static bool shared_frame(const carrier *c, size_t now, size_t old, const char *n
 
 // The halves of a lumped strut between the motions of its two ends: both turn alike and slide on
 // each other along z. With Δ = u_top − u_bottom over the length:
-//   d = z·Δ,  θ = z × Δ / length + z (z·mean θ),  v = mean u − ½ d z,  w static between its springs
+//   d = z·Δ,  θ = z × Δ / length + z (z·mean θ),  v = mean u − ½ d z,  w static between its
+//   springs: (k_a + k_e) w = k_e d + f
 static void strut_between(const carrier *c, size_t now, const double *bottom, const double *top) {
   const pb_component *s = &c->now->plant->component[now];
   const size_t n = c->old->n, start = c->now->layout.component[now];
@@ -140,6 +142,10 @@ static void strut_between(const carrier *c, size_t now, const double *bottom, co
       c->l[(start + 7) * n + x] = springs > 0.0 ? s->strut.k_e / springs * d : 0.0;
     }
   }
+  if (s->type != PB_APA_2DOF || !(s->strut.k_a + s->strut.k_e > 0.0)) return;
+  for (size_t j = 0; j < c->now->nu; j++)
+    c->lu[(start + 7) * c->now->nu + j] =
+        c->now->f[start + 7 + j * c->now->n] / (s->strut.k_a + s->strut.k_e);
 }
 
 // The rows of an element's interface frame out of a motion at that frame, world axes.
@@ -155,8 +161,10 @@ static void node_set(const carrier *c, size_t start, size_t node, const double r
   }
 }
 
-// K_oo X = −K_ob for the coordinates o that are not given[]; false where K_oo is singular.
-static bool static_shape(const pb_element *e, const bool *given, size_t count, double *shape) {
+// K_oo [X Y] = [−K_ob F_o] for the coordinates o that are not given[]; shape comes with F_o in its
+// last columns. False where K_oo is singular.
+static bool static_shape(const pb_element *e, const bool *given, size_t count, size_t forces,
+                         double *shape) {
   const size_t m = e->size, free_count = m - count;
   double *koo = malloc((free_count * free_count + 1) * sizeof *koo);
   int *pivot = malloc((free_count + 1) * sizeof *pivot), info = 1;
@@ -173,7 +181,7 @@ static bool static_shape(const pb_element *e, const bool *given, size_t count, d
       }
       given[j] ? b++ : col++;
     }
-    int n = (int)free_count, nrhs = (int)count;
+    int n = (int)free_count, nrhs = (int)(count + forces);
     info = 0;
     if (n > 0) dgesv_(&n, &nrhs, koo, &n, pivot, shape, &n, &info);
   }
@@ -182,13 +190,17 @@ static bool static_shape(const pb_element *e, const bool *given, size_t count, d
   return info == 0;
 }
 
-// What an element has beside the coordinates that are given follows them statically.
+// What an element has beside the coordinates that are given follows them statically, and the forces
+// that act inside it.
 static pb_status element_follow(const carrier *c, const pb_element *e, size_t start,
                                 const bool *given, size_t count) {
-  const size_t m = e->size, n = c->old->n, free_count = m - count;
-  double *shape = calloc(free_count * count + 1, sizeof *shape);
+  const size_t m = e->size, n = c->old->n, free_count = m - count, nu = c->now->nu;
+  double *shape = calloc(free_count * (count + nu) + 1, sizeof *shape);
   if (!shape) return pb_fail_memory(c->err, e->file);
-  if (!static_shape(e, given, count, shape)) {
+  for (size_t j = 0, at = free_count * count; j < nu; j++)
+    for (size_t i = 0; i < m; i++)
+      if (!given[i]) shape[at++] = c->now->f[start + i + j * c->now->n];
+  if (!static_shape(e, given, count, nu, shape)) {
     free(shape);
     return pb_fail(c->err, PB_ERR_SINGULAR, e->file,
                    "its ends alone do not hold the element: it cannot follow them");
@@ -200,6 +212,8 @@ static pb_status element_follow(const carrier *c, const pb_element *e, size_t st
     memset(c->l + (start + i) * n, 0, n * sizeof *c->l);
     for (size_t j = 0; j < m; j++)
       if (given[j]) add_row(c, start + i, shape[row + free_count * b++], c->l + (start + j) * n);
+    for (size_t j = 0; j < nu; j++)
+      c->lu[(start + i) * nu + j] = shape[row + free_count * (count + j)];
     row++;
   }
   free(shape);
@@ -374,28 +388,38 @@ static pb_status carry(carrier *c) {
   return st;
 }
 
-// L is made by rows and handed out column-major.
-pb_status pb_transfer_coordinates(const pb_motion_map *from, const pb_motion_map *to, double **out,
-                                  pb_error *err) {
+static void transpose(const double *a, size_t rows, size_t cols, double *out) {
+  for (size_t r = 0; r < rows; r++)
+    for (size_t x = 0; x < cols; x++) out[r + x * rows] = a[r * cols + x];
+}
+
+// L and L_u are made by rows and handed out column-major.
+pb_status pb_transfer_coordinates(const pb_motion_map *from, const pb_motion_map *to, double **l,
+                                  double **lu, pb_error *err) {
   const size_t n = from->n, rows = to->n;
   carrier c = {.old = from, .now = to, .err = err};
-  double *columns = malloc(n * rows * sizeof *columns);
+  *l = malloc(n * rows * sizeof **l);
+  *lu = malloc(to->nu * rows * sizeof **lu);
   c.l = calloc(n * rows, sizeof *c.l);
+  c.lu = calloc(to->nu * rows, sizeof *c.lu);
   c.row = malloc(6 * n * sizeof *c.row);
   c.next = malloc(6 * n * sizeof *c.next);
   c.known = calloc(to->plant->component_count + 1, sizeof *c.known);
-  *out = NULL;
-  pb_status st =
-      columns && c.l && c.row && c.next && c.known ? carry(&c) : pb_fail_memory(err, "transfer");
-  for (size_t r = 0; r < rows && !st; r++)
-    for (size_t x = 0; x < n; x++) columns[r + x * rows] = c.l[r * n + x];
+  const bool ok = *l && *lu && c.l && c.lu && c.row && c.next && c.known;
+  pb_status st = ok ? carry(&c) : pb_fail_memory(err, "transfer");
+  if (!st) {
+    transpose(c.l, rows, n, *l);
+    transpose(c.lu, rows, to->nu, *lu);
+  }
   free(c.l);
+  free(c.lu);
   free(c.row);
   free(c.next);
   free(c.known);
-  if (st)
-    free(columns);
-  else
-    *out = columns;
+  if (st) {
+    free(*l);
+    free(*lu);
+    *l = *lu = NULL;
+  }
   return st;
 }
