@@ -36,12 +36,8 @@ static pb_status block_check(const pb_daemon *d, const plantbus_BlockRequest *in
 // Under lock.
 static pb_status block_admit(const pb_daemon *d, const plantbus_BlockRequest *in, pb_error *err) {
   const pb_engine *e = &d->engine;
-  if (e->drive == PB_DRIVE_REALTIME)
-    return pb_fail(err, PB_ERR_STATE, "", "the plant runs in real time");
-  if (e->drive == PB_DRIVE_LOCKSTEP && pb_engine_barrier_count(e) > 0)
-    return pb_fail(err, PB_ERR_STATE, "", "attached clients step the plant; pause it first");
-  if (e->budget > 0)
-    return pb_fail(err, PB_ERR_STATE, "", "the steps of an earlier request are not done yet");
+  pb_status status = pb_request_may_step(e, err);
+  if (status) return status;
   if (in->epoch != 0 && in->epoch != e->epoch)
     return pb_fail(err, PB_ERR_STATE, "/epoch", "the plant is in epoch %u", e->epoch);
   if (in->step != UINT64_MAX && in->step != e->step)

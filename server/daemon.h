@@ -268,8 +268,8 @@ pb_status pb_daemon_continue(pb_daemon *daemon, bool ran, pb_error *err);
 void pb_daemon_restart(pb_daemon *daemon, const pb_snapshot_data *from, pb_event_kind kind,
                        const char *text);
 
-// Whether a snapshot fits the plant that is stepped: PB_ERR_STATE. request_snapshot.c
-pb_status pb_daemon_admits(const pb_daemon *daemon, const pb_snapshot_data *data, pb_error *err);
+// Whether steps may be asked for: nobody else steps the plant. PB_ERR_STATE. request_run.c
+pb_status pb_request_may_step(const pb_engine *engine, pb_error *err);
 
 // Goes on from the snapshot file of the options. [init]
 pb_status pb_daemon_resume(pb_daemon *daemon, pb_error *err);

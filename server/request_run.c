@@ -75,6 +75,16 @@ pb_status pb_request_set_mode(pb_daemon *d, pb_request *request, pb_error *err) 
   return pb_daemon_continue(d, drive == PB_DRIVE_REALTIME, err);
 }
 
+pb_status pb_request_may_step(const pb_engine *e, pb_error *err) {
+  if (e->drive == PB_DRIVE_REALTIME)
+    return pb_fail(err, PB_ERR_STATE, "", "the plant runs in real time");
+  if (e->drive == PB_DRIVE_LOCKSTEP && pb_engine_barrier_count(e) > 0)
+    return pb_fail(err, PB_ERR_STATE, "", "attached clients step the plant; pause it first");
+  if (e->budget > 0)
+    return pb_fail(err, PB_ERR_STATE, "", "the steps of an earlier request are not done yet");
+  return PB_OK;
+}
+
 pb_status pb_request_step(pb_daemon *d, pb_request *request, pb_error *err) {
   static const char *const keys[] = {"n", NULL};
   double n = 1.0;
@@ -83,12 +93,7 @@ pb_status pb_request_step(pb_daemon *d, pb_request *request, pb_error *err) {
   if (status) return status;
   pthread_mutex_lock(&d->lock);
   pb_engine *engine = &d->engine;
-  if (engine->drive == PB_DRIVE_REALTIME)
-    status = pb_fail(err, PB_ERR_STATE, "", "the plant runs in real time");
-  else if (engine->drive == PB_DRIVE_LOCKSTEP && pb_engine_barrier_count(engine) > 0)
-    status = pb_fail(err, PB_ERR_STATE, "", "attached clients step the plant; pause it first");
-  else if (engine->budget > 0)
-    status = pb_fail(err, PB_ERR_STATE, "", "the steps of an earlier request are not done yet");
+  status = pb_request_may_step(engine, err);
   if (!status) {
     pb_engine_allow(engine, (uint64_t)n, pb_daemon_clock());
     pb_bus_run_ready(d);

@@ -88,7 +88,8 @@ pb_status pb_request_snapshot(pb_daemon *d, pb_request *request, pb_error *err) 
   return status ? status : resumed;
 }
 
-pb_status pb_daemon_admits(const pb_daemon *d, const pb_snapshot_data *data, pb_error *err) {
+// Whether a snapshot fits the plant that is stepped.
+static pb_status snapshot_admit(const pb_daemon *d, const pb_snapshot_data *data, pb_error *err) {
   const pb_revision *live = d->live;
   if (strcmp(data->plant_sha256, live->sha256) != 0)
     return pb_fail(err, PB_ERR_STATE, "snapshot",
@@ -109,7 +110,7 @@ static pb_status host_build(const pb_daemon *d, const pb_snapshot_data *data, pb
 
 static pb_status restore(pb_daemon *d, const pb_snapshot_data *data, pb_error *err) {
   pb_host *host = NULL;
-  pb_status status = pb_daemon_admits(d, data, err);
+  pb_status status = snapshot_admit(d, data, err);
   if (!status) status = host_build(d, data, &host, err);
   if (status) return status;
   const bool ran = pb_daemon_halt(d);
