@@ -1,0 +1,12 @@
+// plantbus-part: parts of one's own, from dimensions or from other programs' matrices to elements.
+#include "part.h"
+
+static const pb_command commands[] = {
+    {0},
+};
+
+int main(int argc, char **argv) {
+  return pb_commands_run(argc, argv,
+                         "Builds, reduces, imports and examines super-elements for plant files.",
+                         commands);
+}

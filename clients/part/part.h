@@ -1,0 +1,7 @@
+// plantbus-part: parts of one's own, from dimensions or from other programs' matrices to elements.
+#ifndef PB_CLIENTS_PART_H
+#define PB_CLIENTS_PART_H
+
+#include "commands.h"
+
+#endif

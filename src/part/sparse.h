@@ -1,0 +1,30 @@
+// Symmetric sparse matrices by compressed columns, entries on and above the diagonal only, rows
+// ascending within a column, no duplicates: the form that CHOLMOD takes as it is (stype 1).
+#ifndef PB_PART_SPARSE_H
+#define PB_PART_SPARSE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/status.h"
+
+typedef struct pb_sparse {
+  size_t n;        // rows = columns
+  int64_t *start;  // [n + 1] start[j] … start[j+1] are the entries of column j; start[n] = entries
+  int64_t *row;    // [entries] ≤ j in column j
+  double *value;   // [entries]
+} pb_sparse;
+
+// From unordered entries (row[k], col[k], value[k]) of either triangle; equal places are added up.
+// An entry and its mirror image both given count twice: hand over one triangle only.
+// Fails with PB_ERR_MEMORY, PB_ERR_ARGUMENT (an index beyond n). *out is owned by the caller.
+// [init]
+pb_status pb_sparse_from_entries(size_t n, size_t count, const int64_t *row, const int64_t *col,
+                                 const double *value, pb_sparse *out, pb_error *err);
+
+// y ← A x for `columns` columns, x and y n × columns with leading dimension n. [any]
+void pb_sparse_multiply(const pb_sparse *a, size_t columns, const double *x, double *y);
+
+void pb_sparse_clear(pb_sparse *a);
+
+#endif
