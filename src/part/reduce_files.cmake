@@ -1,0 +1,2 @@
+# Reduction of full models to elements; included by CMakeLists.txt.
+list(APPEND PB_PART_SOURCES sparse.c fem.c)
