@@ -116,9 +116,19 @@ static pb_matrix_reader *reader_of(pb_matrix_format format) {
     return pb_read_matrix_market;
   case PB_FORMAT_CALCULIX:
     return pb_read_calculix;
-  default:
-    return NULL;
+  case PB_FORMAT_ANSYS_PRINT:
+    return pb_read_ansys_print;
+  case PB_FORMAT_NASTRAN_DMIG:
+    return pb_read_dmig;
+  case PB_FORMAT_ABAQUS_MTX:
+    return pb_read_abaqus;
+  case PB_FORMAT_CSV:
+    return pb_read_csv;
+  case PB_FORMAT_MAT5:
+  case PB_FORMAT_UNKNOWN:
+    break;
   }
+  return NULL;
 }
 
 static pb_status read_text(const char *path, const char *name, pb_matrix_reader *read,
@@ -139,8 +149,13 @@ pb_status pb_matrix_file_read(const char *path, const char *name, pb_matrix_file
   pb_status st = pb_matrix_file_detect(path, &format, err);
   pb_matrix_reader *read = reader_of(format);
   if (st) return st;
-  st = read ? read_text(path, name, read, out, err)
-            : pb_fail(err, PB_ERR_SYNTAX, path, "is in no format that is known here");
+  if (read) {
+    st = read_text(path, name, read, out, err);
+  } else if (format == PB_FORMAT_MAT5) {
+    st = pb_read_mat5(path, name, out, err);
+  } else {
+    st = pb_fail(err, PB_ERR_SYNTAX, path, "is in no format that is known here");
+  }
   if (!st && (!out->rows || !out->count))
     st = pb_fail(err, PB_ERR_SYNTAX, path, "holds no entries");
   if (st) pb_matrix_file_clear(out);
