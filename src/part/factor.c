@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "part/supersolve.h"
+
 static pb_status fail_cholmod(const pb_factor *f, pb_error *err) {
   if (f->common.status == CHOLMOD_OUT_OF_MEMORY) return pb_fail_memory(err, "stiffness");
   return pb_fail(err, PB_ERR_NUMERIC, "stiffness", "CHOLMOD reports status %d", f->common.status);
@@ -28,6 +30,7 @@ void pb_factor_clear(pb_factor *f) {
   }
   free(f->place);
   free(f->row);
+  free(f->work);
   *f = (pb_factor){0};
 }
 
@@ -215,6 +218,9 @@ static pb_status analyse(pb_factor *f, const pb_sparse *a, pb_error *err) {
     perm[i] = (SuiteSparse_long)i;
   }
   f->l->ordering = CHOLMOD_NATURAL;
+  const SuiteSparse_long *pi = f->l->pi;
+  for (size_t s = 0; s < f->l->nsuper; s++)
+    if ((size_t)(pi[s + 1] - pi[s]) > f->largest) f->largest = (size_t)(pi[s + 1] - pi[s]);
   free(f->row);
   f->row = row;
   return PB_OK;
@@ -297,20 +303,55 @@ static cholmod_dense dense(size_t rows, size_t columns, double *x) {
                          .dtype = CHOLMOD_DOUBLE};
 }
 
-pb_status pb_factor_solve(pb_factor *f, size_t columns, double *x, pb_error *err) {
-  size_t spare = f->l->maxesize + 1;
-  double *y = malloc((f->n + spare) * (columns + 1) * sizeof *y);
-  if (!y) return pb_fail_memory(err, "stiffness");
-  cholmod_dense by = dense(f->n, columns, y), bspare = dense(spare, columns, y + f->n * columns);
+// A solve's room is kept for the next one: the system hands out large pieces page by page, zeroed,
+// which takes as long as using them.
+static pb_status reserve(pb_factor *f, size_t columns, pb_error *err) {
+  size_t wanted = (f->n + f->largest) * columns;
+  if (wanted <= f->room) return PB_OK;
+  free(f->work);
+  f->room = 0;
+  f->work = malloc(wanted * sizeof *f->work);
+  if (!f->work) return pb_fail_memory(err, "stiffness");
+  f->room = wanted;
+  return PB_OK;
+}
+
+static void solve_narrow(pb_factor *f, size_t columns, double *x) {
+  enum { WIDTH = PB_SUPERSOLVE_WIDTH };
+  double *y = f->work;
+  for (size_t i = 0; i < f->n; i++) {
+    const double *from = x + f->row[i];
+    for (size_t c = 0; c < WIDTH; c++) y[c + i * WIDTH] = c < columns ? from[c * f->rows] : 0;
+  }
+  pb_supersolve(f->l, y, y + f->n * WIDTH);
+  for (size_t i = 0; i < f->n; i++)
+    for (size_t c = 0; c < columns; c++) x[f->row[i] + c * f->rows] = y[c + i * WIDTH];
+}
+
+static bool solve_wide(pb_factor *f, size_t columns, double *x) {
+  double *y = f->work;
+  cholmod_dense by = dense(f->n, columns, y);
+  cholmod_dense spare = dense(f->largest, columns, y + f->n * columns);
   for (size_t c = 0; c < columns; c++)
     for (size_t i = 0; i < f->n; i++) y[i + c * f->n] = x[f->row[i] + c * f->rows];
-  bool ok = cholmod_l_super_lsolve(f->l, &by, &bspare, &f->common) &&
-            cholmod_l_super_ltsolve(f->l, &by, &bspare, &f->common);
-  if (ok) {
-    memset(x, 0, f->rows * columns * sizeof *x);
-    for (size_t c = 0; c < columns; c++)
-      for (size_t i = 0; i < f->n; i++) x[f->row[i] + c * f->rows] = y[i + c * f->n];
+  bool ok = cholmod_l_super_lsolve(f->l, &by, &spare, &f->common) &&
+            cholmod_l_super_ltsolve(f->l, &by, &spare, &f->common);
+  for (size_t c = 0; ok && c < columns; c++)
+    for (size_t i = 0; i < f->n; i++) x[f->row[i] + c * f->rows] = y[i + c * f->n];
+  return ok;
+}
+
+pb_status pb_factor_solve(pb_factor *f, size_t columns, double *x, pb_error *err) {
+  bool narrow = columns <= PB_SUPERSOLVE_WIDTH;
+  pb_status st = reserve(f, narrow ? PB_SUPERSOLVE_WIDTH : columns, err);
+  if (st) return st;
+  if (narrow) {
+    solve_narrow(f, columns, x);
+  } else if (!solve_wide(f, columns, x)) {
+    return fail_cholmod(f, err);
   }
-  free(y);
-  return ok ? PB_OK : fail_cholmod(f, err);
+  for (size_t c = 0; c < columns; c++)
+    for (size_t i = 0; i < f->rows; i++)
+      if (f->place[i] < 0) x[i + c * f->rows] = 0;
+  return PB_OK;
 }

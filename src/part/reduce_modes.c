@@ -32,6 +32,7 @@ typedef struct lanczos {
   double *q;                       // full × k
   double *h;                       // room × room, upper triangle: QᵀM A Q
   double *u, *mu;                  // full × BLOCK: block at work and M times it
+  double *spare;                   // full × BLOCK
   double coupling[BLOCK * BLOCK];  // B_j, block × last
   double *theta, *s;               // Ritz values ascending, k × k vectors
   size_t ritz;                     // size of the last decomposition
@@ -101,15 +102,13 @@ static pb_status normalise(lanczos *z, size_t columns, double least, size_t *kep
       scaled[c + r * columns] = g[c + (first + r) * columns] / length;
     }
   }
-  double *fresh = malloc(z->full * (*kept + 1) * sizeof *fresh);
-  if (!fresh) return pb_fail_memory(err, "modes");
-  double *pair[2] = {z->u, z->mu};
+  double **pair[2] = {&z->u, &z->mu};
   for (size_t i = 0; i < 2; i++) {
-    gemm("N", "N", z->full, *kept, columns, 1, pair[i], z->full, scaled, columns, 0, fresh,
-         z->full);
-    memcpy(pair[i], fresh, z->full * *kept * sizeof *fresh);
+    double *old = *pair[i];
+    gemm("N", "N", z->full, *kept, columns, 1, old, z->full, scaled, columns, 0, z->spare, z->full);
+    *pair[i] = z->spare;
+    z->spare = old;
   }
-  free(fresh);
   return PB_OK;
 }
 
@@ -357,12 +356,14 @@ pb_status reduce_modes(reduce_work *w, pb_error *err) {
   pb_random_seed(&z.random, 1, 0);
   z.u = malloc(w->full * BLOCK * sizeof *z.u);
   z.mu = malloc(w->full * BLOCK * sizeof *z.mu);
-  if (!st && (!z.u || !z.mu)) st = pb_fail_memory(err, w->fem->name);
+  z.spare = malloc(w->full * BLOCK * sizeof *z.spare);
+  if (!st && (!z.u || !z.mu || !z.spare)) st = pb_fail_memory(err, w->fem->name);
   if (!st) st = run(&z, err);
   free(z.q);
   free(z.h);
   free(z.u);
   free(z.mu);
+  free(z.spare);
   free(z.theta);
   free(z.s);
   return st;
