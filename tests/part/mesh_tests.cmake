@@ -1,2 +1,3 @@
 # Meshes, their matrices, and elements built from dimensions.
 pb_test(test_mesh LABELS unit SOURCES test_mesh.c LIBS plantbus_part)
+pb_test(test_parts LABELS reference SOURCES test_parts.c LIBS plantbus_part TIMEOUT 300)
