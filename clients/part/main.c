@@ -2,6 +2,7 @@
 #include "part.h"
 
 static const pb_command commands[] = {
+    {"build", part_build, "from dimensions to an element"},
     {0},
 };
 

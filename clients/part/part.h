@@ -4,4 +4,6 @@
 
 #include "commands.h"
 
+pb_command_function part_build;
+
 #endif

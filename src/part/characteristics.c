@@ -62,41 +62,49 @@ static pb_status solve_held(const pb_reduction *e, size_t frame, int loads, doub
               : PB_OK;
 }
 
-// The frequency of the mode with the largest effective mass along z, frame 0 held.
-static pb_status axial_mode(const pb_reduction *e, double *hz, pb_error *err) {
+pb_status pb_element_held_modes(const pb_reduction *e, size_t frame, double *hz, double *shape,
+                                pb_error *err) {
   int n = (int)e->size - 6, itype = 1, info = 0, lwork = 1 + 6 * n + 2 * n * n, liwork = 3 + 5 * n;
   size_t size = (size_t)n;
-  double *k = without_frame(e->k, e->size, 0), *m = without_frame(e->m, e->size, 0);
-  double *w = malloc(size * sizeof *w), *work = malloc((size_t)lwork * sizeof *work);
-  double *push = calloc(size, sizeof *push);
+  double *k = without_frame(e->k, e->size, frame), *m = without_frame(e->m, e->size, frame);
+  double *work = malloc((size_t)lwork * sizeof *work);
   int *iwork = malloc((size_t)liwork * sizeof *iwork);
-  pb_status st = PB_OK;
-  if (!k || !m || !w || !work || !push || !iwork) {
-    st = pb_fail_memory(err, "characteristics");
-    goto done;
+  pb_status st = k && m && work && iwork ? PB_OK : pb_fail_memory(err, "characteristics");
+  if (!st) {
+    dsygvd_(&itype, "V", "U", &n, k, &n, m, &n, hz, work, &lwork, iwork, &liwork, &info);
+    if (info) st = pb_fail(err, PB_ERR_NUMERIC, "characteristics", "the modes did not converge");
   }
-  for (size_t j = 1; j < e->frames; j++)  // M R, R: all frames along z; modal rows stay at rest
-    for (size_t i = 0; i < size; i++) push[i] += m[i + (6 * (j - 1) + 2) * size];
-  dsygvd_(&itype, "V", "U", &n, k, &n, m, &n, w, work, &lwork, iwork, &liwork, &info);
-  if (info) {
-    st = pb_fail(err, PB_ERR_NUMERIC, "characteristics", "the modes did not converge");
-    goto done;
+  for (size_t mode = 0; !st && mode < size; mode++) {
+    hz[mode] = sqrt(fmax(hz[mode], 0)) / two_pi;
+    double *to = shape + mode * e->size;
+    for (size_t i = 0, at = 0; i < e->size; i++) to[i] = i / 6 == frame ? 0 : k[at++ + mode * size];
   }
-  double most = -1;
-  for (size_t mode = 0; mode < size; mode++) {
-    double share = 0;
-    for (size_t i = 0; i < size; i++) share += k[i + mode * size] * push[i];
-    if (share * share <= most) continue;
-    most = share * share;
-    *hz = sqrt(fmax(w[mode], 0)) / two_pi;
-  }
-done:
   free(k);
   free(m);
-  free(w);
   free(work);
-  free(push);
   free(iwork);
+  return st;
+}
+
+// The frequency of the mode with the largest effective mass along z, frame 0 held.
+static pb_status axial_mode(const pb_reduction *e, double *axial, pb_error *err) {
+  size_t n = e->size, modes = n - 6;
+  double *hz = malloc(modes * sizeof *hz), *shape = malloc(n * modes * sizeof *shape);
+  double *push = calloc(n, sizeof *push), most = -1;
+  pb_status st = hz && shape && push ? PB_OK : pb_fail_memory(err, "characteristics");
+  for (size_t j = 0; !st && j < e->frames; j++)  // M R, R: all frames along z, modal rows at rest
+    for (size_t i = 0; i < n; i++) push[i] += e->m[i + (6 * j + 2) * n];
+  if (!st) st = pb_element_held_modes(e, 0, hz, shape, err);
+  for (size_t mode = 0; !st && mode < modes; mode++) {
+    double share = 0;
+    for (size_t i = 0; i < n; i++) share += shape[i + mode * n] * push[i];
+    if (share * share <= most) continue;
+    most = share * share;
+    *axial = hz[mode];
+  }
+  free(hz);
+  free(shape);
+  free(push);
   return st;
 }
 

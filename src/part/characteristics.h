@@ -33,4 +33,9 @@ pb_status pb_part_characteristics(const pb_part *part, const pb_reduction *eleme
                                   pb_characteristic out[PB_CHARACTERISTICS], size_t *count,
                                   pb_error *err);
 
+// Modes of an element with one frame held: hz [size − 6] ascending, shape size × (size − 6) with
+// zeros at the held frame, mass-normalised. Fails with PB_ERR_MEMORY, PB_ERR_NUMERIC. [init]
+pb_status pb_element_held_modes(const pb_reduction *element, size_t frame, double *hz,
+                                double *shape, pb_error *err);
+
 #endif
