@@ -3,6 +3,8 @@
 
 static const pb_command commands[] = {
     {"build", part_build, "from dimensions to an element"},
+    {"import", part_import, "from other programs' matrices to an element"},
+    {"doctor", part_doctor, "what is wrong with an element, and its repair"},
     {0},
 };
 

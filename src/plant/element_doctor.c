@@ -66,7 +66,7 @@ static bool check_numbers(const pb_element_data *w, pb_diagnosis *d) {
            !k   ? "K"
            : !m ? "M"
                 : "int_xyz");
-  snprintf(f->would, sizeof f->would, "nothing: export the part again");
+  snprintf(f->would, sizeof f->would, "not curable here: export the part again");
   return false;
 }
 
@@ -88,8 +88,9 @@ static void treat_asymmetry(double *x, size_t n, const char *which, int digits, 
     snprintf(f->saw, sizeof f->saw, "%s differs from its transpose by %.1e of its diagonal", which,
              asymmetry);
     snprintf(f->would, sizeof f->would, "%s",
-             asymmetry <= allowed ? "takes the mean with the transpose"
-                                  : "nothing: this is more than rounding; export the part again");
+             asymmetry <= allowed
+                 ? "takes the mean with the transpose"
+                 : "not curable here: this is more than rounding; export the part again");
   }
   pb_cure_mean(x, n);
 }
@@ -108,7 +109,7 @@ static pb_status treat_mass(const char *name, pb_element_data *w, pb_diagnosis *
     snprintf(f->saw, sizeof f->saw, "M has a diagonal entry that is not positive");
   snprintf(f->would, sizeof f->would, "%s",
            curable ? "lifts the eigenvalue to what rounding leaves uncertain"
-                   : "nothing: rounding does not explain it; export the part again");
+                   : "not curable here: rounding does not explain it; export the part again");
   return curable ? pb_cure_mass(name, w, fmax(-d->mass_smallest, 1e-9), err) : PB_OK;
 }
 
@@ -124,18 +125,7 @@ static void note_digits(pb_diagnosis *d) {
 // ---- the body -----------------------------------------------------------------------------------
 
 static double rounding_of(const pb_diagnosis *d) {
-  return fmax(1e-7, 20 * pow(10, -d->digits_k));
-}
-
-static pb_status treat_frames(const char *name, pb_element_data *w, pb_diagnosis *d,
-                              pb_error *err) {
-  double tolerance = rounding_of(d), *r = malloc(6 * w->size * sizeof *r);
-  if (!r) return pb_fail_memory(err, name);
-  pb_rigid_motions(w, r);
-  pb_measure_rigid(w, r, &d->translation_residual, &d->rotation_residual);
-  free(r);
-  if (d->translation_residual <= tolerance && d->rotation_residual <= tolerance) return PB_OK;
-  return pb_doctor_place(name, w, tolerance, d, err);
+  return fmax(1e-5, 20 * pow(10, -d->digits_k));
 }
 
 static void measure_body(const pb_element_data *w, pb_diagnosis *d) {
@@ -174,18 +164,35 @@ static int magnitude_order(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-static pb_status measure_rigid_hz(const char *name, const pb_element_data *w, pb_diagnosis *d,
-                                  pb_error *err) {
+// rigid [6] and the first flexible frequency; NaN where M is not definite, which was judged before.
+static pb_status measure_rigid_hz(const char *name, const pb_element_data *w, double *rigid,
+                                  double *flexible, pb_error *err) {
   double *hz = malloc(w->size * sizeof *hz);
   if (!hz) return pb_fail_memory(err, name);
   pb_status st = pb_measure_modes(name, w->size, w->k, w->m, hz, NULL, err);
-  if (!st) {
-    qsort(hz, w->size, sizeof *hz, magnitude_order);
-    memcpy(d->rigid_hz, hz, sizeof d->rigid_hz);
-    d->flexible_hz = w->size > 6 ? hz[6] : INFINITY;
-  }
+  if (!st) qsort(hz, w->size, sizeof *hz, magnitude_order);
+  for (int k = 0; k < 6; k++) rigid[k] = st ? NAN : hz[k];
+  *flexible = st ? NAN : w->size > 6 ? hz[6] : INFINITY;
   free(hz);
-  return st == PB_ERR_ELEMENT ? PB_OK : st;  // M was judged before: no frequencies then
+  return st == PB_ERR_ELEMENT ? PB_OK : st;
+}
+
+// Same bounds as the loader's warning.
+static bool moves_freely(const double *rigid, double flexible) {
+  double worst = fabs(rigid[5]);
+  return worst <= 1e-2 * fabs(flexible) && worst <= 10;
+}
+
+// The eigenvalues know nothing of coordinates: it is K R that tells whether they fit.
+static pb_status treat_frames(const char *name, pb_element_data *w, pb_diagnosis *d,
+                              pb_error *err) {
+  double tolerance = rounding_of(d), *r = malloc(6 * w->size * sizeof *r);
+  if (!r) return pb_fail_memory(err, name);
+  pb_rigid_motions(w, r);
+  pb_measure_rigid(w, r, &d->translation_residual, &d->rotation_residual);
+  free(r);
+  if (d->translation_residual <= tolerance && d->rotation_residual <= tolerance) return PB_OK;
+  return pb_doctor_place(name, w, tolerance, d, err);
 }
 
 static bool has(const pb_diagnosis *d, pb_finding_code code) {
@@ -200,23 +207,24 @@ static bool curable(const pb_diagnosis *d) {
   return true;
 }
 
-// Same bounds as the loader's warning.
 static pb_status treat_rigid(const char *name, pb_element_data *w, const pb_doctor_options *options,
                              pb_diagnosis *d, pb_error *err) {
-  double worst = fabs(d->rigid_hz[5]);
-  bool bad = worst > 1e-2 * fabs(d->flexible_hz) || worst > 10;
-  bool digits = has(d, PB_FINDING_FEW_DIGITS);
-  if (!curable(d) || (!bad && !digits)) return PB_OK;
-  pb_status st = pb_cure_rigid(name, w, options->weighted, &d->change, err);
+  double rigid[6], flexible;
+  if (!curable(d)) return PB_OK;
+  pb_status st = measure_rigid_hz(name, w, rigid, &flexible, err);
+  if (st) return st;
+  bool bad = !moves_freely(rigid, flexible);
+  if (!bad && !has(d, PB_FINDING_FEW_DIGITS)) return PB_OK;
+  st = pb_cure_rigid(name, w, options->weighted, &d->change, err);
   if (st || !bad) return st;
   pb_finding *f = pb_doctor_note(d, PB_FINDING_RIGID_MOTIONS, d->change < 0.02);
   snprintf(f->saw, sizeof f->saw,
            "rigid motions of the free part have up to %.4g Hz instead of 0 (first flexible mode "
            "%.5g Hz)",
-           d->rigid_hz[5], d->flexible_hz);
+           rigid[5], flexible);
   snprintf(f->would, sizeof f->would, "%s (a change of K by %.1e)",
            f->curable ? "projects K on the complement of the rigid motions"
-                      : "nothing: the projection would change K by more than rounding can",
+                      : "not curable here: the projection would change K by more than rounding can",
            d->change);
   return st;
 }
@@ -235,9 +243,9 @@ static pb_status walk(const char *name, pb_element_data *w, const pb_doctor_opti
   treat_asymmetry(w->m, n, "M", d->digits_m, d);
   note_digits(d);
   pb_status st = treat_mass(name, w, d, err);
+  if (!st) st = measure_rigid_hz(name, w, d->rigid_hz, &d->flexible_hz, err);
   if (!st) st = treat_frames(name, w, d, err);
   if (!st) treat_units(w, options, d);
-  if (!st) st = measure_rigid_hz(name, w, d, err);
   if (!st) st = treat_rigid(name, w, options, d, err);
   return st;
 }

@@ -47,10 +47,12 @@ static bool normalise(double *v, size_t n) {
   return true;
 }
 
-// One frame's rotation and place out of its 6 × 6 block; what is left over is its misfit.
-static double read_block(const double *v, size_t n, size_t frame, double *d, double *q) {
+// One frame's rotation and place out of its 6 × 6 block. What is left over is its misfit: *turn of
+// the rotations, *skew (m) of the arms.
+static void read_block(const double *v, size_t n, size_t frame, double *d, double *q, double *turn,
+                       double *skew) {
   const double *b = v + 6 * frame;
-  double s[9], misfit = 0, size = 0;
+  double s[9];
   for (size_t j = 0; j < 3; j++)
     for (size_t i = 0; i < 3; i++) q[i + 3 * j] = b[i + j * n];
   for (size_t j = 0; j < 3; j++) {
@@ -61,18 +63,21 @@ static double read_block(const double *v, size_t n, size_t frame, double *d, dou
         unit += q[l + 3 * i] * q[l + 3 * j];
       }
       s[i + 3 * j] = product;
-      misfit = fmax(misfit, fabs(unit - (i == j)));
-      misfit = fmax(misfit, fabs(b[3 + i + (3 + j) * n] - q[i + 3 * j]));
+      *turn = fmax(*turn, fabs(unit - (i == j)));
+      *turn = fmax(*turn, fabs(b[3 + i + (3 + j) * n] - q[i + 3 * j]));
     }
   }
   d[0] = 0.5 * (s[1 + 6] - s[2 + 3]);
   d[1] = 0.5 * (s[2] - s[0 + 6]);
   d[2] = 0.5 * (s[0 + 3] - s[1]);
-  size = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-  for (size_t j = 0; size > 0 && j < 3; j++)
-    for (size_t i = 0; i <= j; i++)
-      misfit = fmax(misfit, 0.5 * fabs(s[i + 3 * j] + s[j + 3 * i]) / size);
-  return misfit;
+  for (size_t j = 0; j < 3; j++)
+    for (size_t i = 0; i <= j; i++) *skew = fmax(*skew, 0.5 * fabs(s[i + 3 * j] + s[j + 3 * i]));
+}
+
+static double reach(const double *p, size_t frames) {
+  double most = 0;
+  for (size_t i = 0; i < 3 * frames; i++) most = fmax(most, fabs(p[i]));
+  return most;
 }
 
 pb_status pb_placement_solve(const char *name, const pb_element_data *e, pb_placement *out,
@@ -88,10 +93,11 @@ pb_status pb_placement_solve(const char *name, const pb_element_data *e, pb_plac
   if (!st) {
     double *v = shape + lowest_six(hz, n, &gap) * n;
     out->found = gap < 0.3 && normalise(v, n);
+    double turn = gap * gap, skew = 0;
     for (size_t f = 0; out->found && f < e->frames; f++)
-      out->misfit =
-          fmax(out->misfit, read_block(v, n, f, out->position + 3 * f, out->rotation + 9 * f));
-    out->misfit = fmax(out->misfit, gap * gap);
+      read_block(v, n, f, out->position + 3 * f, out->rotation + 9 * f, &turn, &skew);
+    double arm = fmax(reach(out->position, out->found ? e->frames : 0), 1e-6);
+    out->misfit = fmax(turn, skew / arm);
   }
   free(hz);
   free(shape);
@@ -181,13 +187,34 @@ static void turn_matrix(double *x, size_t n, size_t frames, const double *rotati
   }
 }
 
-static void treat_turned(pb_element_data *e, const pb_placement *p, double tolerance,
-                         pb_diagnosis *d) {
+// Columns of q made orthonormal (Gram–Schmidt): K tells them to the accuracy of its null space.
+static void make_rotation(double *q) {
+  for (size_t j = 0; j < 3; j++) {
+    double norm = 0;
+    for (size_t l = 0; l < j; l++) {
+      double dot = 0;
+      for (size_t i = 0; i < 3; i++) dot += q[i + 3 * l] * q[i + 3 * j];
+      for (size_t i = 0; i < 3; i++) q[i + 3 * j] -= dot * q[i + 3 * l];
+    }
+    for (size_t i = 0; i < 3; i++) norm += q[i + 3 * j] * q[i + 3 * j];
+    for (size_t i = 0; i < 3; i++) q[i + 3 * j] /= sqrt(norm);
+  }
+}
+
+// Half a degree, or what the digits leave uncertain: frames that are turned by less stay.
+static void treat_turned(pb_element_data *e, pb_placement *p, double tolerance, pb_diagnosis *d) {
+  static const double none[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   size_t turned = 0, first = 0;
   for (size_t f = e->frames; f-- > 0;) {
-    if (turn_angle(p->rotation + 9 * f) <= fmax(tolerance, 1e-5)) continue;
-    turned++;
-    first = f;
+    double *q = p->rotation + 9 * f;
+    bool is = turn_angle(q) > fmax(10 * tolerance, 8.7e-3);
+    if (is) {
+      make_rotation(q);
+      turned++;
+      first = f;
+    } else {
+      memcpy(q, none, sizeof none);
+    }
   }
   if (!turned) return;
   pb_finding *note = pb_doctor_note(d, PB_FINDING_TURNED_FRAMES, true);
@@ -208,7 +235,8 @@ static void treat_scale(pb_element_data *e, double ratio, pb_diagnosis *d) {
     snprintf(note->saw, sizeof note->saw, "the coordinates are %.4g times what K says%s%s",
              known[k], k % 2 ? ": K and M are in another unit of length" : ": they are in ",
              k % 2 ? "" : unit[k]);
-    snprintf(note->would, sizeof note->would, "divides the coordinates by %.4g", known[k]);
+    snprintf(note->would, sizeof note->would, "%s the coordinates by %.4g",
+             known[k] > 1 ? "divides" : "multiplies", known[k] > 1 ? known[k] : 1 / known[k]);
     for (size_t i = 0; i < 3 * e->frames; i++) e->position[i] /= known[k];
     return;
   }
@@ -308,8 +336,8 @@ pb_status pb_doctor_place(const char *name, pb_element_data *e, double tolerance
                "has no rigid motions of its own that would explain them",
                d->rotation_residual);
     snprintf(note->would, sizeof note->would, "%s",
-             held ? "nothing: export the part free, without supports"
-                  : "nothing: export the part again, with its frames' coordinates");
+             held ? "not curable here: export the part free, without supports"
+                  : "not curable here: export the part again, with its frames' coordinates");
   }
   pb_placement_clear(&p);
   return st;
