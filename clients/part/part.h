@@ -5,6 +5,6 @@
 #include "commands.h"
 
 pb_command_function part_build;
-pb_command_function part_doctor, part_import;
+pb_command_function part_doctor, part_import, part_truncate;
 
 #endif
