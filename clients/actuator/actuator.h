@@ -1,0 +1,78 @@
+// plantbus-actuator: its commands, and what they share.
+#ifndef PB_ACTUATOR_ACTUATOR_H
+#define PB_ACTUATOR_ACTUATOR_H
+
+#include "commands.h"
+#include "excite_options.h"
+#include "jsonout.h"
+#include "matfile.h"
+#include "source.h"
+#include "study/actuator_fit.h"
+
+int command_characterize(int argc, char **argv);
+int command_constants(int argc, char **argv);
+int command_select(int argc, char **argv);
+int command_fit(int argc, char **argv);
+int command_boundary(int argc, char **argv);
+
+// Quantities of actuators in data sheets and specifications, NULL-terminated.
+extern const char *const actuator_quantities[];
+
+// ---- experiments on a running bench (live.c) ----------------------------------------------------
+
+// --live and the names of the signals.
+typedef struct live_options {
+  bool live;
+  pb_common_options common;
+  pb_excite_options excite;
+  const char *va, *y, *vs, *force;  // defaults Va, y, Vs, F
+} live_options;
+
+extern const struct argp live_argp;  // argp child; its input is a live_options
+void live_defaults(live_options *options);
+
+// What an identification of a bench gives.
+typedef struct live_result {
+  pb_apa_data data;   // y/V_a, V_s/V_a
+  double compliance;  // y/F at 0 Hz, m/N; NaN: the plant has no such input
+  char plant[128];
+  uint32_t revision;
+} live_result;  // free with live_result_clear
+
+// Identifies V_a (and F, where with_force is set and the plant has it) → y, V_s of the plant on the
+// bus. Fails as pb_bench_open, pb_experiment_run, and with PB_ERR_REFERENCE for missing signals.
+pb_status live_identify(const live_options *options, bool with_force, live_result *out,
+                        pb_error *err);
+void live_result_clear(live_result *result);
+
+// ---- small helpers (print.c) --------------------------------------------------------------------
+
+// nf frequencies from f1 to f2, equally spaced on a logarithmic axis; the caller's, NULL: no
+// memory.
+double *log_frequencies(double f1, double f2, size_t nf);
+
+// The response of one channel of a model, by names; the caller's. Fails as pb_model_frf.
+pb_status channel_response(const pb_model *model, const char *input, const char *output,
+                           const double *hz, size_t nf, double complex **h, pb_error *err);
+
+// A row "name, value in its unit, data sheet, difference" of a table of figures.
+typedef struct part_figure {
+  const char *key, *name, *unit;
+  double scale, value;  // SI value × scale is in unit
+  double low, high;     // data sheet; NaN: unknown
+} part_figure;
+pb_status figures_print(const part_figure *list, size_t count, bool sheet, pb_error *err);
+void figures_json(pb_jsonout *json, const part_figure *list, size_t count);
+void figures_mat(pb_matfile *mat, const part_figure *list, size_t count);
+
+// A CSV of responses: frequency, real and imaginary part of each.
+typedef struct response {
+  const char *name, *unit;
+  const double complex *h;  // [nf]
+} response;
+pb_status responses_csv(const char *path, const double *hz, size_t nf, const response *response,
+                        size_t count, pb_error *err);
+void responses_mat(pb_matfile *mat, const double *hz, size_t nf, const response *response,
+                   size_t count);
+
+#endif
