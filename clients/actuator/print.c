@@ -1,10 +1,11 @@
-// Figures and responses as tables, JSON, CSV and MAT: see actuator.h.
+// Figures and responses as tables, JSON, CSV and MAT: see print.h.
+#include "print.h"
+
 #include <ctype.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "actuator.h"
 #include "csv.h"
 #include "table.h"
 
