@@ -217,8 +217,8 @@ static void fill_defaults(const fit_options *o, fit_result *r) {
 static pb_status tune(const fit_options *o, fit_result *r, pb_error *err) {
   const pb_frf *frf = &r->data.frf;
   const pb_apa_refine_options refine = {o->refine1, o->refine2, o->free_ratio};
-  pb_status st = pb_apa_from_landmarks(&r->landmarks, o->load + 0.5 * r->mass, o->inner, o->ratio,
-                                       &r->by_order, err);
+  pb_status st = pb_apa_from_landmarks(&r->landmarks, r->data.sample_rate, o->load + 0.5 * r->mass,
+                                       o->inner, o->ratio, &r->by_order, err);
   r->apa = r->by_order;
   if (!st && o->refine2 > 0) st = pb_apa_refine(&r->data, &refine, &r->apa, &r->refined, err);
   if (!st)

@@ -61,28 +61,63 @@ static void solve4(const double *ad, double complex lambda, const double *b, dou
   }
 }
 
+// A_d and B_d of the zero-order hold.
+static pb_status sample(const pb_apa_2dof *p, double sample_rate, double ad[16], double bd[4],
+                        pb_error *err) {
+  double a[16], b[4], gd[16];
+  fill_states(p, a, b);
+  pb_status st = pb_block_discretize(4, a, 1 / sample_rate, ad, gd, err);
+  for (int i = 0; i < 4; i++) {
+    bd[i] = 0;
+    for (int j = 0; j < 4 && !st; j++) bd[i] += gd[i + 4 * j] * b[j];
+  }
+  return st;
+}
+
+static void sampled(const pb_apa_2dof *p, const double *ad, const double *bd, double complex z,
+                    double complex h[2]) {
+  double complex x[4];
+  solve4(ad, z, bd, x);
+  h[PB_APA_Y] = x[0];
+  h[PB_APA_VS] = p->g_s * (x[0] - x[1]);
+}
+
 pb_status pb_apa_2dof_response(const pb_apa_2dof *p, double sample_rate, const double *hz,
                                size_t nf, double complex *h, pb_error *err) {
-  double a[16], b[4], ad[16], gd[16], bd[4] = {0};
-  pb_status st = PB_OK;
-  if (sample_rate > 0) {
-    fill_states(p, a, b);
-    st = pb_block_discretize(4, a, 1 / sample_rate, ad, gd, err);
-    for (int i = 0; i < 4 && !st; i++)
-      for (int j = 0; j < 4; j++) bd[i] += gd[i + 4 * j] * b[j];
-  }
+  double ad[16], bd[4];
+  pb_status st = sample_rate > 0 ? sample(p, sample_rate, ad, bd, err) : PB_OK;
   for (size_t f = 0; f < nf && !st; f++) {
     double complex *at = h + PB_APA_OUTPUTS * f;
-    if (sample_rate > 0) {
-      double complex x[4];
-      solve4(ad, cexp(I * two_pi * hz[f] / sample_rate), bd, x);
-      at[PB_APA_Y] = x[0];
-      at[PB_APA_VS] = p->g_s * (x[0] - x[1]);
-    } else {
-      continuous(p, I * two_pi * hz[f], at);
-    }
+    const double complex s = I * two_pi * hz[f];
+    if (sample_rate > 0)
+      sampled(p, ad, bd, cexp(s / sample_rate), at);
+    else
+      continuous(p, s, at);
     if (!isfinite(cabs(at[PB_APA_Y])) || !isfinite(cabs(at[PB_APA_VS])))
       st = pb_fail(err, PB_ERR_NUMERIC, "apa_2dof", "the response at %g Hz is not finite", hz[f]);
   }
   return st;
+}
+
+// The secant method: the response is smooth around its zero.
+pb_status pb_apa_2dof_sampled_zero(const pb_apa_2dof *p, double sample_rate, double complex start,
+                                   double complex *zero, pb_error *err) {
+  double ad[16], bd[4];
+  double complex h[2], s0 = start * (1 + 1e-4), s1 = start;
+  pb_status st = sample(p, sample_rate, ad, bd, err);
+  if (st) return st;
+  sampled(p, ad, bd, cexp(s0 / sample_rate), h);
+  double complex h0 = h[PB_APA_VS];
+  for (int k = 0; k < 50; k++) {
+    sampled(p, ad, bd, cexp(s1 / sample_rate), h);
+    const double complex h1 = h[PB_APA_VS], step = h1 * (s1 - s0) / (h1 - h0);
+    if (h1 == 0 || cabs(s1 - s0) < 1e-12 * cabs(s1)) {
+      *zero = s1;
+      return PB_OK;
+    }
+    s0 = s1, h0 = h1;
+    s1 -= step;
+    if (!(cabs(s1 - start) < 0.5 * cabs(start))) break;
+  }
+  return pb_fail(err, PB_ERR_NUMERIC, "apa_2dof", "the zero of the sampled response is not found");
 }

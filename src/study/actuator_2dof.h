@@ -28,4 +28,9 @@ enum { PB_APA_Y, PB_APA_VS, PB_APA_OUTPUTS };
 pb_status pb_apa_2dof_response(const pb_apa_2dof *apa, double sample_rate, const double *hz,
                                size_t nf, double complex *h, pb_error *err);
 
+// The zero of the sampled response V_a → V_s nearest to `start`, both as s (z = e^{s T}). Sampling
+// moves it: the zero-order hold is half a step late. [init] PB_ERR_NUMERIC: the search diverges.
+pb_status pb_apa_2dof_sampled_zero(const pb_apa_2dof *apa, double sample_rate, double complex start,
+                                   double complex *zero, pb_error *err);
+
 #endif

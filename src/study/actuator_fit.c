@@ -143,29 +143,91 @@ pb_status pb_apa_landmarks_of_data(const pb_apa_data *d, pb_apa_landmarks *out, 
 
 // ---- the three steps ----------------------------------------------------------------------------
 
-pb_status pb_apa_from_landmarks(const pb_apa_landmarks *l, double moving, double inner,
-                                double ratio, pb_apa_2dof *out, pb_error *err) {
+// Steps 1 and 2; dampings as they come, below zero too.
+static pb_apa_2dof tune(const pb_apa_landmarks *l, double moving, double inner, double ratio) {
   pb_apa_2dof p = {.moving = moving, .inner = inner};
   const double zero = two_pi * l->zero_hz, pole = two_pi * l->pole_hz;
   const double series = ratio / (1 + ratio);
-  if (!(pole > zero))
+  p.k_1 = moving * zero * zero;
+  p.c_1 = 2 * l->zero_damping * zero * moving;
+  p.k_a = (moving * pole * pole - p.k_1) / series;
+  p.c_a = (2 * l->pole_damping * pole * moving - p.c_1) / series;
+  p.k_e = ratio * p.k_a;
+  p.c_e = ratio * p.c_a;
+  p.g_a = p.g_s = 1;
+  return p;
+}
+
+// Step 3: y/V_a = g_a k_e/(k_1 k_a + k_1 k_e + k_a k_e), V_s/V_a = −g_s (k_1/k_e) y/V_a.
+static void set_gains(const pb_apa_landmarks *l, pb_apa_2dof *p) {
+  p->g_a = l->gain_y * (p->k_1 * p->k_a + p->k_1 * p->k_e + p->k_a * p->k_e) / p->k_e;
+  p->g_s = -l->gain_vs / l->gain_y * p->k_e / p->k_1;
+}
+
+static double complex root_of(double hz, double damping) {
+  return two_pi * hz * (-damping + I * sqrt(fmax(0, 1 - damping * damping)));
+}
+
+// The zero that the landmarks' model has when it is sampled, less the wanted one.
+static pb_status miss_of(const pb_apa_landmarks *l, double sample_rate, double moving, double inner,
+                         double ratio, double complex wanted, double complex *miss, pb_error *err) {
+  const pb_apa_2dof p = tune(l, moving, inner, ratio);
+  pb_status st = pb_apa_2dof_sampled_zero(&p, sample_rate, wanted, miss, err);
+  *miss -= wanted;
+  return st;
+}
+
+// Newton's method in frequency and damping of the continuous zero. How much the inner mass is
+// damped moves the sampled zero more than anything else, so that iterating on the difference
+// diverges.
+static pb_status unsample(pb_apa_landmarks *l, double sample_rate, double moving, double inner,
+                          double ratio, pb_error *err) {
+  const double complex wanted = root_of(l->zero_hz, l->zero_damping);
+  const double step_hz = 1e-4 * l->zero_hz, step_damping = 1e-5;
+  l->zero_damping = l->pole_damping * l->pole_hz / l->zero_hz;  // an inner mass that rings freely
+  for (int k = 0; k < 30; k++) {
+    double complex miss, by_hz, by_damping;
+    pb_apa_landmarks a = *l, b = *l;
+    a.zero_hz += step_hz;
+    b.zero_damping += step_damping;
+    pb_status st = miss_of(l, sample_rate, moving, inner, ratio, wanted, &miss, err);
+    if (!st) st = miss_of(&a, sample_rate, moving, inner, ratio, wanted, &by_hz, err);
+    if (!st) st = miss_of(&b, sample_rate, moving, inner, ratio, wanted, &by_damping, err);
+    if (st) return st;
+    if (cabs(miss) < 1e-9 * cabs(wanted)) return PB_OK;
+    by_hz = (by_hz - miss) / step_hz;
+    by_damping = (by_damping - miss) / step_damping;
+    const double det = creal(by_hz) * cimag(by_damping) - cimag(by_hz) * creal(by_damping);
+    l->zero_hz -= (creal(miss) * cimag(by_damping) - cimag(miss) * creal(by_damping)) / det;
+    l->zero_damping -= (creal(by_hz) * cimag(miss) - cimag(by_hz) * creal(miss)) / det;
+    if (!(fabs(l->zero_damping) < most_damping)) break;
+  }
+  return pb_fail(err, PB_ERR_NUMERIC, "landmarks", "the continuous zero is not found");
+}
+
+static pb_status check_landmarks(const pb_apa_landmarks *l, pb_error *err) {
+  if (!(l->pole_hz > l->zero_hz))
     return pb_fail(err, PB_ERR_NUMERIC, "landmarks",
                    "the first pole (%.4g Hz) does not lie above the first zero (%.4g Hz)",
                    l->pole_hz, l->zero_hz);
-  if (!(l->gain_y * l->gain_vs < 0))
-    return pb_fail(err, PB_ERR_NUMERIC, "landmarks",
-                   "y/V_a (%.4g m/V) and V_s/V_a (%.4g) at 0 Hz do not have opposite signs: a "
-                   "positive voltage extends, and positive sensor voltage is tension",
-                   l->gain_y, l->gain_vs);
-  p.k_1 = moving * zero * zero;
-  p.c_1 = fmax(0, 2 * l->zero_damping * zero * moving);
-  p.k_a = (moving * pole * pole - p.k_1) / series;
-  p.c_a = fmax(0, (2 * l->pole_damping * pole * moving - p.c_1) / series);
-  p.k_e = ratio * p.k_a;
-  p.c_e = ratio * p.c_a;
-  // y/V_a = g_a k_e/(k_1 k_a + k_1 k_e + k_a k_e), V_s/V_a = −g_s (k_1/k_e) y/V_a
-  p.g_a = l->gain_y * (p.k_1 * p.k_a + p.k_1 * p.k_e + p.k_a * p.k_e) / p.k_e;
-  p.g_s = -l->gain_vs / l->gain_y * p.k_e / p.k_1;
-  *out = p;
+  if (l->gain_y * l->gain_vs < 0) return PB_OK;
+  return pb_fail(err, PB_ERR_NUMERIC, "landmarks",
+                 "y/V_a (%.4g m/V) and V_s/V_a (%.4g) at 0 Hz do not have opposite signs: a "
+                 "positive voltage extends, and positive sensor voltage is tension",
+                 l->gain_y, l->gain_vs);
+}
+
+pb_status pb_apa_from_landmarks(const pb_apa_landmarks *landmarks, double sample_rate,
+                                double moving, double inner, double ratio, pb_apa_2dof *out,
+                                pb_error *err) {
+  pb_apa_landmarks l = *landmarks;
+  pb_status st = check_landmarks(&l, err);
+  if (st) return st;
+  if (sample_rate > 0 && unsample(&l, sample_rate, moving, inner, ratio, NULL)) l = *landmarks;
+  *out = tune(&l, moving, inner, ratio);
+  out->c_1 = fmax(0, out->c_1);
+  out->c_a = fmax(0, out->c_a);
+  out->c_e = ratio * out->c_a;
+  set_gains(&l, out);
   return PB_OK;
 }

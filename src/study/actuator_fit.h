@@ -40,9 +40,14 @@ pb_status pb_apa_landmarks_of_model(const pb_model *model, pb_apa_landmarks *out
 pb_status pb_apa_landmarks_of_data(const pb_apa_data *data, pb_apa_landmarks *out, pb_error *err);
 
 // Steps 1 to 3. moving: M, kg; inner: m, kg; ratio: r. A damping that would be below zero is 0.
-// Fails with PB_ERR_NUMERIC where the landmarks are not those of such an actuator. [init]
-pb_status pb_apa_from_landmarks(const pb_apa_landmarks *landmarks, double moving, double inner,
-                                double ratio, pb_apa_2dof *out, pb_error *err);
+// sample_rate: of the response that the landmarks are of, 0: continuous time. Sampling moves the
+// zero, by the damping of the inner mass beyond the Nyquist frequency more than by its own: the
+// model is chosen whose sampled zero is the landmark's (where there is none, as if it were
+// continuous). Fails with PB_ERR_NUMERIC where the landmarks are not those of such an actuator.
+// [init]
+pb_status pb_apa_from_landmarks(const pb_apa_landmarks *landmarks, double sample_rate,
+                                double moving, double inner, double ratio, pb_apa_2dof *out,
+                                pb_error *err);
 
 typedef struct pb_apa_refine_options {
   double f1, f2;    // Hz
