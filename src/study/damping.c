@@ -6,7 +6,7 @@
 #include <stdlib.h>
 
 enum {
-  SWEEP = 82,  // gains of the first sweep, 0 among them
+  SWEEP = 122, // gains of the first sweep, 0 among them
   FINER = 6,   // gains put between two of the sweep, on either side of a best one
 };
 
@@ -26,8 +26,8 @@ static size_t most_damped(const pb_rootlocus *l, size_t branch) {
   return best;
 }
 
-// A branch's damping at a gain. A pole that was real when it was seen last has left the band along the
-// real axis; another that is lost is as good as unstable.
+// A branch's damping at a gain. A pole that was real when it was seen last has left the band along
+// the real axis; another that is lost is as good as unstable.
 static double damping_of(const pb_rootlocus *l, size_t branch, size_t k) {
   const pb_pole *p = l->pole + branch * l->gains;
   size_t seen = k;
@@ -36,9 +36,9 @@ static double damping_of(const pb_rootlocus *l, size_t branch, size_t k) {
   return cimag(p[seen].z) == 0 ? p[seen].damping : -1;
 }
 
-// The least damping at a gain, of the modes and of the controller's poles, which begin real: where a
-// mode has split into two real poles, the slow one can make a pair again with one of these. What else
-// begins in the band are modes above half the sample rate under another frequency.
+// The least damping at a gain, of the modes and of the controller's poles, which begin real: where
+// a mode has split into two real poles, the slow one can make a pair again with one of these. What
+// else begins in the band are modes above half the sample rate under another frequency.
 static double smallest_damping(const pb_rootlocus *l, size_t k) {
   double smallest = INFINITY;
   for (size_t b = 0; b < l->branches; b++)
