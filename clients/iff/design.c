@@ -77,7 +77,7 @@ static pb_status list_modes(iff_result *r, pb_error *err) {
                  r->experiment.f1, r->experiment.f2);
 }
 
-pb_status iff_design(iff_result *r, pb_error *err) {
+static pb_status design(iff_result *r, pb_error *err) {
   pb_status status = make_controller(r, err);
   if (status == PB_OK) status = choose_gain(r, err);
   if (status == PB_OK && r->law.gain <= 0) {
@@ -88,6 +88,17 @@ pb_status iff_design(iff_result *r, pb_error *err) {
   if (status == PB_OK) status = make_locus(r, err);
   if (status == PB_OK) status = list_modes(r, err);
   return status;
+}
+
+pb_status iff_prepare(const iff_options *o, const pb_bench *bench, iff_result *r, pb_error *err) {
+  *r = (iff_result){.options = o, .bench = bench, .model = bench->model};
+  iff_experiment_defaults(o, r->model, &r->experiment);
+  pb_status status = iff_choose_loops(r->model, o, &r->loops, err);
+  r->output = malloc((r->model->ny + 1) * sizeof *r->output);
+  if (status == PB_OK && !r->output) status = pb_fail_memory(err, "outputs");
+  for (size_t k = 0; r->output && k < r->model->ny; k++) r->output[k] = k;
+  r->channels = (pb_experiment_channels){r->loops.input, r->output, r->loops.count, r->model->ny};
+  return status == PB_OK ? design(r, err) : status;
 }
 
 static void measurement_clear(iff_measurement *m) {
@@ -107,4 +118,6 @@ void iff_result_clear(iff_result *r) {
   pb_lti_free(&r->controller);
   pb_lti_free(&r->controller_used);
   iff_loops_clear(&r->loops);
+  free(r->output);
+  *r = (iff_result){0};
 }

@@ -1,0 +1,64 @@
+// Responses of the damped plant and of the loops around it: see hac.h.
+#include <math.h>
+#include <stdlib.h>
+
+#include "control/hac.h"
+#include "control/lti_ops.h"
+
+// out = T_y P T_u, P the chosen rows and columns of a full response; work [n × n].
+static void to_frame(const pb_hac_channels *c, const pb_hac_frame *f, size_t nu,
+                     const double complex *full, double complex *work, double complex *out) {
+  size_t n = c->n;
+  for (size_t r = 0; r < n; r++) {
+    for (size_t j = 0; j < n; j++) {
+      double complex sum = 0;
+      for (size_t k = 0; k < n; k++) {
+        double t = f->ty ? f->ty[r + k * n] : (double)(r == k);
+        sum += t * full[c->metrology[k] * nu + c->input[j]];
+      }
+      work[r * n + j] = sum;
+    }
+  }
+  for (size_t r = 0; r < n; r++) {
+    for (size_t j = 0; j < n; j++) {
+      double complex sum = 0;
+      for (size_t k = 0; k < n; k++) {
+        sum += work[r * n + k] * (f->tu ? f->tu[k + j * n] : (double)(k == j));
+      }
+      out[r * n + j] = sum;
+    }
+  }
+}
+
+pb_status pb_hac_plant(const pb_model *model, const pb_hac_channels *channels,
+                       const pb_hac_frame *frame, const pb_lti *iff, unsigned delay,
+                       const double *hz, size_t nf, double complex *h, pb_error *err) {
+  size_t n = channels->n, all = model->ny * model->nu;
+  pb_loop loop = {model, iff, channels->sensor, channels->input, 1, delay};
+  double complex *full = malloc((all + 1) * sizeof *full);
+  double complex *work = malloc((n * n + 1) * sizeof *work);
+  pb_status status = full && work ? PB_OK : pb_fail_memory(err, "hac");
+  for (size_t f = 0; f < nf && status == PB_OK; f++) {
+    status = iff ? pb_loop_frf(&loop, 1, &hz[f], 1, full, err)
+                 : pb_model_frf(model, PB_SAMPLED, &hz[f], 1, full, err);
+    if (status == PB_OK) to_frame(channels, frame, model->nu, full, work, h + f * n * n);
+  }
+  free(full);
+  free(work);
+  return status;
+}
+
+pb_status pb_hac_loop_gain(const pb_lti *shape, const double *gain, unsigned delay,
+                           const double *hz, size_t nf, size_t n, const double complex *plant,
+                           double complex *l, pb_error *err) {
+  pb_status status = PB_OK;
+  for (size_t f = 0; f < nf && status == PB_OK; f++) {
+    double angle = 2 * M_PI * hz[f] * shape->dt;
+    double complex h;
+    status = pb_lti_evaluate(shape, cexp(CMPLX(0, angle)), &h, NULL, err);
+    if (status != PB_OK) break;
+    h *= cexp(CMPLX(0, -angle * delay));
+    for (size_t k = 0; k < n * n; k++) l[f * n * n + k] = plant[f * n * n + k] * h * gain[k % n];
+  }
+  return status;
+}
