@@ -1,7 +1,7 @@
 # Sources of signal/ and control/, relative to src/.
 set(PB_SIGNAL_CONTROL_SOURCES
   signal/excitation.c signal/fft.c signal/frf.c signal/periodic.c signal/periodic_settle.c
-  signal/random.c
+  signal/psd.c signal/random.c
   signal/small_solve.c signal/spectrum.c signal/window.c
   control/fit.c control/fit_relocate.c control/fit_zeros.c control/hac.c control/hac_response.c control/iff.c
   control/jacobian.c control/loop.c

@@ -65,6 +65,22 @@ static pb_status find_transmissions(const control_design *d, control_judgement *
   return status;
 }
 
+// Loci and singular values of L at the metrology, J L J⁻¹ in the Cartesian frame: strut lengths
+// have one unit, what mixes metres and radians has no size.
+static pb_status analyse(const control_design *d, control_judgement *j, pb_error *err) {
+  const control_frame *frame = &d->frame;
+  size_t n = d->n;
+  if (!frame->cartesian) return pb_mimo_analyse(j->hz, j->nf, n, j->l, &j->mimo, err);
+  double complex *l = malloc(j->nf * n * n * sizeof *l);
+  if (!l) return pb_fail_memory(err, "loops");
+  for (size_t f = 0; f < j->nf; f++) {
+    pb_hac_transform(n, frame->j, frame->inverse, j->l + f * n * n, l + f * n * n);
+  }
+  pb_status status = pb_mimo_analyse(j->hz, j->nf, n, l, &j->mimo, err);
+  free(l);
+  return status;
+}
+
 static pb_status find_loops(const control_design *d, control_judgement *j, pb_error *err) {
   size_t n = d->n;
   for (int k = 0; k < 2; k++) j->plant[k] = malloc(j->nf * n * n * sizeof *j->plant[k]);
@@ -81,7 +97,7 @@ static pb_status find_loops(const control_design *d, control_judgement *j, pb_er
     status = pb_hac_loop_gain(&d->shape_lti, d->gain, d->hac_delay, j->hz, j->nf, n, j->plant[1],
                               j->l, err);
   }
-  if (status == PB_OK) status = pb_mimo_analyse(j->hz, j->nf, n, j->l, &j->mimo, err);
+  if (status == PB_OK) status = analyse(d, j, err);
   for (size_t i = 0; i < n && status == PB_OK; i++) {
     j->margins[i] = pb_margins_of(j->hz, j->nf, j->l + i * (n + 1), n * n);
   }

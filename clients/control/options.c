@@ -23,6 +23,7 @@ enum {
   KEY_DISTURBANCE,
   KEY_DELAY,
   KEY_FORCE,
+  KEY_NO_OPEN,
   KEY_HOSTED,
   KEY_KEEP,
 };
@@ -60,6 +61,7 @@ static const struct argp_option option_table[] = {
      "Outputs at the point of interest (default: Dx … Rz, else the metrology)", 4},
     {"disturbance", KEY_DISTURBANCE, "NAMES", 0,
      "Inputs at the point of interest (default: Fx … Mz, else all that are no actuators)", 4},
+    {"no-undamped", KEY_NO_OPEN, NULL, 0, "run: leave out the undamped plant", 5},
     {"hosted", KEY_HOSTED, NULL, 0,
      "run: the daemon runs HAC too (default: this client, over the bus)", 5},
     {"keep", KEY_KEEP, NULL, 0, "run: leave the hosted controllers running", 5},
@@ -145,6 +147,8 @@ static bool parse_flags(int key, char *text, control_options *o) {
     return o->iff.force = true;
   case KEY_NO_IFF:
     return o->no_iff = true;
+  case KEY_NO_OPEN:
+    return o->iff.skip_open_loop = true;
   case KEY_HOSTED:
     return o->hosted = true;
   case KEY_KEEP:

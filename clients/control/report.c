@@ -102,7 +102,7 @@ static pb_status print_loci(const control_design *d, const control_judgement *j,
 
 static void print_mimo(const control_judgement *j) {
   const pb_mimo *m = &j->mimo;
-  printf("\nSensitivity: largest σ(S) %.4g at %.5g Hz", m->s_peak, m->s_peak_hz);
+  printf("\nSensitivity at the metrology: largest σ(S) %.4g at %.5g Hz", m->s_peak, m->s_peak_hz);
   if (m->s_low_hz > 0) printf(", below −3 dB up to %.4g Hz", m->s_low_hz);
   printf("; largest σ(T) %.4g at %.5g Hz\n", m->t_peak, m->t_peak_hz);
 }

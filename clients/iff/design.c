@@ -101,7 +101,7 @@ pb_status iff_prepare(const iff_options *o, const pb_bench *bench, iff_result *r
   return status == PB_OK ? design(r, err) : status;
 }
 
-static void measurement_clear(iff_measurement *m) {
+void iff_measurement_clear(iff_measurement *m) {
   pb_frf_clear(&m->frf);
   free(m->expected);
   pb_fit_clear(&m->fit);
@@ -109,8 +109,8 @@ static void measurement_clear(iff_measurement *m) {
 }
 
 void iff_result_clear(iff_result *r) {
-  measurement_clear(&r->open);
-  measurement_clear(&r->closed);
+  iff_measurement_clear(&r->open);
+  iff_measurement_clear(&r->closed);
   free(r->mode);
   pb_rootlocus_clear(&r->locus);
   pb_best_gain_clear(&r->best);

@@ -60,6 +60,10 @@ typedef struct iff_measurement {
   pb_run_report report;
 } iff_measurement;
 
+// Fills the agreement of a measured response with the expected one. [any]
+void iff_compare(iff_measurement *measurement);
+void iff_measurement_clear(iff_measurement *measurement);
+
 typedef struct iff_result {
   const iff_options *options;
   const pb_bench *bench;

@@ -76,6 +76,11 @@ pb_status iff_print(const iff_result *r, pb_error *err) {
   print_head(r);
   pb_status status = print_modes(r, err);
   printf("\n");
+  if (r->searched) {
+    printf("Smallest damping of the modes that IFF reaches: %.4g %%, the largest of any gain that "
+           "can be doubled\n",
+           100 * r->best.smallest_damping);
+  }
   print_agreement("Undamped", &r->open);
   print_agreement("Damped", &r->closed);
   if (!r->stable) {

@@ -10,8 +10,8 @@
 // gains k_i make each loop gain 1 at ω_c, on the damped plant as it is sampled, with the controller
 // as it is sampled (Tustin), delays included.
 //
-// The structure is that of "Dynamic error budgeting and HAC-LAC" in T. Dehaeze's work on the
-// nano-hexapod; the voltages of both controllers add up on the actuators.
+// The structure is that of A. Preumont, "Vibration Control of Active Structures", chapter 14; the
+// voltages of both controllers add up on the actuators.
 //
 // n loops everywhere; real matrices n × n column-major; responses [nf][n][n] row-major as
 // pb_model_frf. All functions: [init]; PB_ERR_ARGUMENT, PB_ERR_MEMORY.
@@ -51,6 +51,10 @@ typedef struct pb_hac_frame {
 pb_status pb_hac_plant(const pb_model *model, const pb_hac_channels *channels,
                        const pb_hac_frame *frame, const pb_lti *iff, unsigned delay,
                        const double *hz, size_t nf, double complex *h, pb_error *err);
+
+// left · m · right for one frequency; left and right real, NULL: the identity; out is not m. [any]
+void pb_hac_transform(size_t n, const double *left, const double *right, const double complex *m,
+                      double complex *out);
 
 // k_i for |k_i H(z) P_ii(z)| = 1 at the bandwidth; their sign makes each loop a negative feedback.
 // plant: [2][n][n], of pb_hac_plant at the bandwidth and at a hundredth of it. floating: the plant

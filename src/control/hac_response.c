@@ -5,27 +5,17 @@
 #include "control/hac.h"
 #include "control/lti_ops.h"
 
-// out = T_y P T_u, P the chosen rows and columns of a full response; work [n × n].
-static void to_frame(const pb_hac_channels *c, const pb_hac_frame *f, size_t nu,
-                     const double complex *full, double complex *work, double complex *out) {
-  size_t n = c->n;
+void pb_hac_transform(size_t n, const double *left, const double *right, const double complex *m,
+                      double complex *out) {
   for (size_t r = 0; r < n; r++) {
-    for (size_t j = 0; j < n; j++) {
+    for (size_t c = 0; c < n; c++) {
       double complex sum = 0;
-      for (size_t k = 0; k < n; k++) {
-        double t = f->ty ? f->ty[r + k * n] : (double)(r == k);
-        sum += t * full[c->metrology[k] * nu + c->input[j]];
+      for (size_t i = 0; i < n; i++) {
+        double complex row = 0;
+        for (size_t k = 0; k < n; k++) row += m[i * n + k] * (right ? right[k + c * n] : k == c);
+        sum += (left ? left[r + i * n] : r == i) * row;
       }
-      work[r * n + j] = sum;
-    }
-  }
-  for (size_t r = 0; r < n; r++) {
-    for (size_t j = 0; j < n; j++) {
-      double complex sum = 0;
-      for (size_t k = 0; k < n; k++) {
-        sum += work[r * n + k] * (f->tu ? f->tu[k + j * n] : (double)(k == j));
-      }
-      out[r * n + j] = sum;
+      out[r * n + c] = sum;
     }
   }
 }
@@ -41,7 +31,11 @@ pb_status pb_hac_plant(const pb_model *model, const pb_hac_channels *channels,
   for (size_t f = 0; f < nf && status == PB_OK; f++) {
     status = iff ? pb_loop_frf(&loop, 1, &hz[f], 1, full, err)
                  : pb_model_frf(model, PB_SAMPLED, &hz[f], 1, full, err);
-    if (status == PB_OK) to_frame(channels, frame, model->nu, full, work, h + f * n * n);
+    if (status != PB_OK) break;
+    for (size_t k = 0; k < n * n; k++) {
+      work[k] = full[channels->metrology[k / n] * model->nu + channels->input[k % n]];
+    }
+    pb_hac_transform(n, frame->ty, frame->tu, work, h + f * n * n);
   }
   free(full);
   free(work);

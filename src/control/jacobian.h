@@ -3,9 +3,10 @@
 //   ε_L = J X,  X = [x y z Rx Ry Rz]ᵀ;   F = Jᵀ f,  f the forces along the struts
 //
 // Row k of J is [ŝ_kᵀ, (b_k × ŝ_k)ᵀ], with ŝ_k the strut's direction and b_k its joint on the
-// platform seen from the point of interest: small motions of a rigid platform ("The Stewart
-// Platform", B. Dasgupta, T. Mruthyunjaya, 2000). Without a geometry J follows from the static
-// plant: forces at the point of interest move it by G_XF and the struts by G_εF, J = G_εF G_XF⁻¹.
+// platform seen from the point of interest: small motions of a rigid platform (B. Dasgupta,
+// T. Mruthyunjaya, "The Stewart platform manipulator: a review", 2000). Without a geometry J
+// follows from the static plant: forces at the point of interest move it by G_XF and the struts by
+// G_εF, J = G_εF G_XF⁻¹.
 //
 // Matrices n × n, column-major. All functions: [init].
 #ifndef PB_CONTROL_JACOBIAN_H
