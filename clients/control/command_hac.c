@@ -5,8 +5,9 @@
 
 static const char description[] =
     "Designs a high authority controller around the plant that IFF damps, and judges it.\v"
-    "Each loop is a lead, an integrator and a low-pass, with a gain of one at the bandwidth on the "
-    "damped plant as it is sampled. Stability is that of the sampled closed loop's poles; with "
+    "Each loop is a lead, an integrator and a low-pass, with a gain that reaches one at the "
+    "bandwidth and does not exceed it beyond, on the damped plant as it is sampled. Stability is "
+    "that of the sampled closed loop's poles; with "
     "an unstable one nothing is exported and the exit code is 1.\n\n"
     "Exit codes: 0 done, 1 failed or unstable, 2 wrong command line.\n\n"
     "Examples:\n"

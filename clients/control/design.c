@@ -20,19 +20,45 @@ static const pb_lti *iff_of(const control_design *d) {
   return d->damped ? &d->iff.controller_used : NULL;
 }
 
+// From the bandwidth on, fine where the plant has modes.
+static pb_status gain_grid(const control_design *d, double **hz, size_t *count, pb_error *err) {
+  enum { POINTS = 300 };
+  pb_pole_list poles = {0};
+  *hz = NULL;
+  pb_status status = pb_all_poles(d->model, &poles, err);
+  if (status == PB_OK) {
+    status = pb_margins_grid(d->shape.bandwidth_hz, d->model->sample_rate / 2, POINTS, &poles, hz,
+                             count, err);
+  }
+  pb_pole_list_clear(&poles);
+  return status;
+}
+
 static pb_status find_gains(control_design *d, pb_error *err) {
-  size_t n = d->n;
-  const double hz[2] = {d->shape.bandwidth_hz, 0.01 * d->shape.bandwidth_hz};
-  double complex *plant = malloc(2 * n * n * sizeof *plant);
+  size_t n = d->n, count = 0;
+  const double far_below = 0.01 * d->shape.bandwidth_hz;
+  double *hz;
+  pb_status status = gain_grid(d, &hz, &count, err);
+  if (status != PB_OK) return status;
+  double complex *plant = malloc((count + 1) * n * n * sizeof *plant);
   d->gain = malloc(n * sizeof *d->gain);
-  pb_status status = plant && d->gain ? pb_hac_plant(d->model, &d->channels, &d->frame.transform,
-                                                     iff_of(d), d->iff_delay, hz, 2, plant, err)
-                                      : pb_fail_memory(err, "gains");
+  if (!plant || !d->gain) status = pb_fail_memory(err, "gains");
+  const pb_hac_frame *frame = &d->frame.transform;
+  if (status == PB_OK) {
+    status =
+        pb_hac_plant(d->model, &d->channels, frame, iff_of(d), d->iff_delay, hz, count, plant, err);
+  }
+  if (status == PB_OK) {
+    status = pb_hac_plant(d->model, &d->channels, frame, iff_of(d), d->iff_delay, &far_below, 1,
+                          plant + count * n * n, err);
+  }
   bool floating = d->model->modes > 0 && d->model->mode_hz[0] == 0;
   if (status == PB_OK) {
-    status = pb_hac_gains(&d->shape_lti, hz[0], plant, n, floating, d->gain, err);
+    status = pb_hac_gains(&d->shape_lti, hz, count, plant, plant + count * n * n, n, floating,
+                          d->gain, err);
   }
   free(plant);
+  free(hz);
   return status;
 }
 

@@ -42,7 +42,7 @@ static pb_status settle(const run_result *r, control_stage stage, double *second
   pb_pole_list poles = {0};
   pb_status status = pb_all_poles(d->model, &poles, err);
   if (status != PB_OK) return status;
-  *seconds = pb_settling_time(&poles, rate, solver ? 4 * e->f2 : e->f1, 1e-2, 20);
+  *seconds = pb_settling_time(&poles, rate, solver ? 4 * e->f2 : e->f1, 1e-2, solver ? 2 : 20);
   pb_pole_list_clear(&poles);
   if (!solver) return PB_OK;
   status = pb_loop_solver_poles(solver, 1, 0, 4 * e->f2, &poles, err);

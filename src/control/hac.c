@@ -66,21 +66,26 @@ pb_status pb_hac_shape_discrete(const pb_hac_shape *shape, double rate, pb_lti *
   return status;
 }
 
-pb_status pb_hac_gains(const pb_lti *shape, double bandwidth_hz, const double complex *plant,
-                       size_t n, bool floating, double *gain, pb_error *err) {
-  double complex h;
-  double complex z = cexp(CMPLX(0, 2 * M_PI * bandwidth_hz * shape->dt));
-  pb_status status = pb_lti_evaluate(shape, z, &h, NULL, err);
-  for (size_t i = 0; i < n && status == PB_OK; i++) {
-    double size = cabs(h * plant[i * n + i]), low = creal(plant[n * n + i * n + i]);
-    if (!(size > 0 && isfinite(size)) || low == 0) {
-      return pb_fail(err, PB_ERR_STATE, "bandwidth", "loop %zu has no gain at %g Hz", i + 1,
-                     bandwidth_hz);
+pb_status pb_hac_gains(const pb_lti *shape, const double *hz, size_t nf,
+                       const double complex *plant, const double complex *low, size_t n,
+                       bool floating, double *gain, pb_error *err) {
+  for (size_t i = 0; i < n; i++) gain[i] = 0;
+  for (size_t f = 0; f < nf; f++) {
+    double complex h, z = cexp(CMPLX(0, 2 * M_PI * hz[f] * shape->dt));
+    pb_status status = pb_lti_evaluate(shape, z, &h, NULL, err);
+    if (status != PB_OK) return status;
+    for (size_t i = 0; i < n; i++) gain[i] = fmax(gain[i], cabs(h * plant[(f * n + i) * n + i]));
+  }
+  for (size_t i = 0; i < n; i++) {
+    double size = gain[i], rest = creal(low[i * n + i]);
+    if (!(size > 0 && isfinite(size)) || rest == 0) {
+      return pb_fail(err, PB_ERR_STATE, "bandwidth", "loop %zu has no gain from %g Hz on", i + 1,
+                     nf > 0 ? hz[0] : 0);
     }
     // A spring line is positive at low frequency, the mass line of a floating plant negative.
-    gain[i] = ((low > 0) == !floating ? 1 : -1) / size;
+    gain[i] = ((rest > 0) == !floating ? 1 : -1) / size;
   }
-  return status;
+  return PB_OK;
 }
 
 // A gain matrix as a system; m NULL: the identity.

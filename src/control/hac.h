@@ -7,8 +7,9 @@
 // T_y = T_u = I along the struts; T_y = J⁻¹, T_u = J⁻ᵀ in the Cartesian coordinates of the point of
 // interest (jacobian.h). H is an integrator up to ω_i, a lead of ratio a around the crossover ω_c,
 // where its gain is 1, and a low-pass at ω_l; a factor is left out where its parameter says so. The
-// gains k_i make each loop gain 1 at ω_c, on the damped plant as it is sampled, with the controller
-// as it is sampled (Tustin), delays included.
+// gains k_i make each loop gain reach 1 at ω_c and not exceed it beyond, whatever modes lie there:
+// its highest crossover is the bandwidth, or the peak of a mode above it that just touches 1. They
+// are those of the damped plant as it is sampled, with the controller as it is sampled (Tustin).
 //
 // The structure is that of A. Preumont, "Vibration Control of Active Structures", chapter 14; the
 // voltages of both controllers add up on the actuators.
@@ -56,11 +57,13 @@ pb_status pb_hac_plant(const pb_model *model, const pb_hac_channels *channels,
 void pb_hac_transform(size_t n, const double *left, const double *right, const double complex *m,
                       double complex *out);
 
-// k_i for |k_i H(z) P_ii(z)| = 1 at the bandwidth; their sign makes each loop a negative feedback.
-// plant: [2][n][n], of pb_hac_plant at the bandwidth and at a hundredth of it. floating: the plant
-// has rigid-body modes. PB_ERR_STATE: a loop without gain there.
-pb_status pb_hac_gains(const pb_lti *shape, double bandwidth_hz, const double complex *plant,
-                       size_t n, bool floating, double *gain, pb_error *err);
+// k_i for max |k_i H(z) P_ii(z)| = 1 over hz[nf], the frequencies from the bandwidth on; their sign
+// makes each loop a negative feedback. plant: [nf][n][n] of pb_hac_plant at hz, low: [n][n] of it
+// far below the bandwidth. floating: the plant has rigid-body modes. PB_ERR_STATE: a loop without
+// gain there.
+pb_status pb_hac_gains(const pb_lti *shape, const double *hz, size_t nf,
+                       const double complex *plant, const double complex *low, size_t n,
+                       bool floating, double *gain, pb_error *err);
 
 // T_u diag(k_i H) T_y, n × n, from metrology to −u.
 pb_status pb_hac_controller(const pb_lti *shape, const double *gain, const pb_hac_frame *frame,
