@@ -24,33 +24,35 @@ typedef struct variant {
   double (*read)(const double *data, size_t count);  // count: a multiple of 64
 } variant;
 
-#define VARIANT(name, vector, count, attribute)                                                   \
-  attribute                                                                                       \
-      __attribute__((optimize("fp-contract=fast"))) static void fma_##name(double *p, size_t n) { \
-    vector x[count];                                                                              \
-    for (int k = 0; k < count; k++) x[k] = ((vector *)p)[k];                                      \
-    for (size_t left = n * ROUND; left; left--)                                                   \
-      for (int k = 0; k < count; k++) x[k] = x[k] * 0.999999 + 1e-6;                              \
-    for (int k = 0; k < count; k++) ((vector *)p)[k] = x[k];                                      \
-  }                                                                                               \
-  attribute static void apart_##name(double *p, size_t n) {                                       \
-    vector x[count];                                                                              \
-    for (int k = 0; k < count; k++) x[k] = ((vector *)p)[k];                                      \
-    for (size_t left = n * ROUND; left; left--)                                                   \
-      for (int k = 0; k < count; k += 2) x[k] *= 0.999999, x[k + 1] += 1e-6;                      \
-    for (int k = 0; k < count; k++) ((vector *)p)[k] = x[k];                                      \
-  }                                                                                               \
-  attribute static double read_##name(const double *p, size_t n) {                                \
-    enum { LANES = sizeof(vector) / sizeof(double) };                                             \
-    vector sum[8] = {0};                                                                          \
-    for (size_t k = 0; k < n; k += 8 * LANES)                                                     \
-      for (int l = 0; l < 8; l++) sum[l] += *(const vector *)(p + k + l * LANES);                 \
-    double all = 0;                                                                               \
-    for (int l = 0; l < 8; l++)                                                                   \
-      for (int e = 0; e < LANES; e++) all += sum[l][e];                                           \
-    return all;                                                                                   \
-  }                                                                                               \
-  static const variant variant_##name = {sizeof(vector) / sizeof(double), count, fma_##name,      \
+#define VARIANT(name, vector, count, attribute)                                               \
+  attribute static void fma_##name(double *p, size_t n) {                                     \
+    vector x[count];                                                                          \
+    for (int k = 0; k < count; k++) x[k] = ((vector *)p)[k];                                  \
+    for (size_t left = n * ROUND; left; left--) {                                             \
+      _Pragma("GCC unroll 24") for (int k = 0; k < count; k++) x[k] = x[k] * 0.999999 + 1e-6; \
+    }                                                                                         \
+    for (int k = 0; k < count; k++) ((vector *)p)[k] = x[k];                                  \
+  }                                                                                           \
+  attribute static void apart_##name(double *p, size_t n) {                                   \
+    vector x[count];                                                                          \
+    for (int k = 0; k < count; k++) x[k] = ((vector *)p)[k];                                  \
+    for (size_t left = n * ROUND; left; left--) {                                             \
+      _Pragma("GCC unroll 24") for (int k = 0; k < count; k += 2) x[k] *= 0.999999,           \
+          x[k + 1] += 1e-6;                                                                   \
+    }                                                                                         \
+    for (int k = 0; k < count; k++) ((vector *)p)[k] = x[k];                                  \
+  }                                                                                           \
+  attribute static double read_##name(const double *p, size_t n) {                            \
+    enum { LANES = sizeof(vector) / sizeof(double) };                                         \
+    vector sum[8] = {0};                                                                      \
+    for (size_t k = 0; k < n; k += 8 * LANES)                                                 \
+      for (int l = 0; l < 8; l++) sum[l] += *(const vector *)(p + k + l * LANES);             \
+    double all = 0;                                                                           \
+    for (int l = 0; l < 8; l++)                                                               \
+      for (int e = 0; e < LANES; e++) all += sum[l][e];                                       \
+    return all;                                                                               \
+  }                                                                                           \
+  static const variant variant_##name = {sizeof(vector) / sizeof(double), count, fma_##name,  \
                                          apart_##name, read_##name};
 
 VARIANT(portable, v2, 12, )
