@@ -18,6 +18,8 @@ void dgesv_(const int *n, const int *nrhs, double *a, const int *lda, int *ipiv,
 void dgetrf_(const int *m, const int *n, double *a, const int *lda, int *ipiv, int *info);
 void dgetrs_(const char *trans, const int *n, const int *nrhs, const double *a, const int *lda,
              const int *ipiv, double *b, const int *ldb, int *info);
+void dgetri_(const int *n, double *a, const int *lda, const int *ipiv, double *work,
+             const int *lwork, int *info);
 void zgesv_(const int *n, const int *nrhs, double complex *a, const int *lda, int *ipiv,
             double complex *b, const int *ldb, int *info);
 void dpotrf_(const char *uplo, const int *n, double *a, const int *lda, int *info);
@@ -53,6 +55,9 @@ void dsygvd_(const int *itype, const char *jobz, const char *uplo, const int *n,
 void dgeev_(const char *jobvl, const char *jobvr, const int *n, double *a, const int *lda,
             double *wr, double *wi, double *vl, const int *ldvl, double *vr, const int *ldvr,
             double *work, const int *lwork, int *info);
+void zgeev_(const char *jobvl, const char *jobvr, const int *n, double complex *a, const int *lda,
+            double complex *w, double complex *vl, const int *ldvl, double complex *vr,
+            const int *ldvr, double complex *work, const int *lwork, double *rwork, int *info);
 void dgees_(const char *jobvs, const char *sort, int (*select)(const double *, const double *),
             const int *n, double *a, const int *lda, int *sdim, double *wr, double *wi, double *vs,
             const int *ldvs, double *work, const int *lwork, int *bwork, int *info);
