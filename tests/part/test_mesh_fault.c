@@ -27,40 +27,45 @@ void *__wrap_realloc(void *p, size_t size) {
 typedef pb_status (*subject)(const cJSON *json, pb_error *err);
 
 static pb_status model(const cJSON *json, pb_error *err) {
-  pb_part part;
+  pb_part read;
   pb_mesh mesh = {0};
   pb_fem fem = {0};
-  pb_status st = pb_part_read(json, &part, err);
-  if (!st) part.density = 0.5;
-  if (!st) st = pb_part_mesh(&part, &mesh, err);
+  pb_status st = pb_part_read(json, &read, err);
+  if (!st) read.density = 0.5;
+  if (!st) st = pb_part_mesh(&read, &mesh, err);
   if (st) assert_null(mesh.xyz);
-  if (!st) st = pb_part_model(&part, &mesh, &fem, err);
+  if (!st) st = pb_part_model(&read, &mesh, &fem, err);
   if (st) assert_null(fem.xyz);
   pb_fem_clear(&fem);
   pb_mesh_clear(&mesh);
-  pb_part_clear(&part);
+  pb_part_clear(&read);
   return st;
+}
+
+static pb_part part;
+static pb_reduction *element;
+
+static void make_element(const cJSON *json) {
+  pb_mesh mesh;
+  pb_fem fem;
+  pb_reduce_options options = {.modes = 2};
+  REQUIRE(pb_part_read(json, &part, &err));
+  part.density = 0.5;
+  REQUIRE(pb_part_mesh(&part, &mesh, &err));
+  REQUIRE(pb_part_model(&part, &mesh, &fem, &err));
+  REQUIRE(pb_reduce(&fem, &options, false, &element, &err));
+  pb_fem_clear(&fem);
+  pb_mesh_clear(&mesh);
 }
 
 // Of an element made once, before anything fails.
 static pb_status characteristics(const cJSON *json, pb_error *err) {
-  static pb_part part;
-  static pb_reduction *element;
   pb_characteristic value[PB_CHARACTERISTICS];
   size_t count;
   if (!element) {
     long kept = failing;
     failing = 0;
-    pb_mesh mesh;
-    pb_fem fem;
-    pb_reduce_options options = {.modes = 2};
-    REQUIRE(pb_part_read(json, &part, &err));
-    part.density = 0.5;
-    REQUIRE(pb_part_mesh(&part, &mesh, &err));
-    REQUIRE(pb_part_model(&part, &mesh, &fem, &err));
-    REQUIRE(pb_reduce(&fem, &options, false, &element, &err));
-    pb_fem_clear(&fem);
-    pb_mesh_clear(&mesh);
+    make_element(json);
     failing = kept, allocations = 0;
   }
   pb_status st = pb_part_characteristics(&part, element, value, &count, err);
