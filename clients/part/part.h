@@ -5,5 +5,6 @@
 #include "commands.h"
 
 pb_command_function part_build;
+pb_command_function part_reduce;
 
 #endif
