@@ -241,13 +241,60 @@ static void test_calculix_actuator(void **state) {
   compare_matrices();
 }
 
+// The full model that build writes goes through reduce to the same element.
+static void test_full_and_back(void **state) {
+  (void)state;
+  cJSON *built = part_json("build " JOINT " --mesh 0.5 --json --full full -o direct.mat");
+  assert_int_equal(part_run("reduce full/K.mtx full/M.mtx --nodes full/nodes.csv "
+                            "--frames full/frames.json --modes 6 -o again.mat"),
+                   0);
+  pb_element *a = NULL, *b = NULL;
+  REQUIRE(pb_element_load(part_path("direct.mat"), NULL, &a, &err));
+  REQUIRE(pb_element_load(part_path("again.mat"), NULL, &b, &err));
+  assert_int_equal(a->size, b->size);
+  for (size_t j = 0; j < 12; j++)
+    for (size_t i = 0; i < 12; i++)
+      ASSERT_NEAR(b->k[i + j * b->size], a->k[i + j * a->size],
+                  1e-8 * sqrt(a->k[i + i * a->size] * a->k[j + j * a->size]));
+  for (size_t i = 6; i < a->size; i++) ASSERT_RELATIVE(b->omega2[i], a->omega2[i], 1e-7);
+  pb_element_free(a);
+  pb_element_free(b);
+  cJSON_Delete(built);
+}
+
+// The documented way of any solid: gmsh, CalculiX, plantbus-part reduce.
+static void test_bracket(void **state) {
+  (void)state;
+  if (!part_has("gmsh") || !part_has("ccx")) {
+    print_message("skipped: gmsh and CalculiX (ccx) are not both installed\n");
+    skip();
+  }
+  int code = part_shell("PLANTBUS_BIN='" PB_BIN "' '" PB_CONFIG "/parts/bracket/make.sh' bracket");
+  char *complaint = part_text("stderr");
+  if (code) fail_msg("make.sh: %s", complaint);
+  free(complaint);
+  pb_element *element = NULL;
+  pb_warnings warnings = {0};
+  REQUIRE(pb_element_load(part_path("bracket/bracket.mat"), &warnings, &element, &err));
+  assert_int_equal(warnings.count, 0);
+  assert_int_equal(element->frames, 2);
+  assert_int_equal(element->size, 24);
+  ASSERT_RELATIVE(element->position[0], 28e-3, 1e-12);
+  double volume = 40e-3 * 20e-3 * 6e-3 + 34e-3 * 20e-3 * 6e-3 - 2 * 3.14159265 * 9e-6 * 6e-3;
+  ASSERT_RELATIVE(element->health.mass, 7800 * volume, 1e-3);
+  assert_true(fabs(element->health.rigid_hz) < 1);
+  pb_warnings_clear(&warnings);
+  pb_element_free(element);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_element),  cmocka_unit_test(test_matrix_market),
-      cmocka_unit_test(test_sweep),    cmocka_unit_test(test_convergence),
-      cmocka_unit_test(test_table),    cmocka_unit_test(test_picture),
-      cmocka_unit_test(test_png),      cmocka_unit_test(test_messages),
-      cmocka_unit_test(test_calculix), cmocka_unit_test(test_calculix_actuator),
+      cmocka_unit_test(test_element),       cmocka_unit_test(test_matrix_market),
+      cmocka_unit_test(test_sweep),         cmocka_unit_test(test_convergence),
+      cmocka_unit_test(test_table),         cmocka_unit_test(test_picture),
+      cmocka_unit_test(test_png),           cmocka_unit_test(test_messages),
+      cmocka_unit_test(test_calculix),      cmocka_unit_test(test_calculix_actuator),
+      cmocka_unit_test(test_full_and_back), cmocka_unit_test(test_bracket),
   };
   return cmocka_run_group_tests(tests, part_folder_make, part_folder_remove);
 }
