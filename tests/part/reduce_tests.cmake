@@ -1,2 +1,6 @@
 # Tests of the reduction.
 pb_test(test_reduce LABELS unit SOURCES test_reduce.c truss.c LIBS plantbus_part)
+pb_test(fault_reduce LABELS fault SOURCES test_reduce_fault.c truss.c LIBS plantbus_part)
+target_include_directories(fault_reduce SYSTEM PRIVATE ${CHOLMOD_INCLUDE})
+target_link_libraries(fault_reduce PRIVATE suitesparseconfig)
+target_link_options(fault_reduce PRIVATE -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc)
