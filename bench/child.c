@@ -15,6 +15,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "base/text.h"
 #include "bench.h"
 
 static void stay_on(int cpu) {
@@ -77,6 +78,24 @@ bool bench_child_read(bench_child *child, void *data, size_t size, double second
     got += (size_t)n;
   }
   return true;
+}
+
+char *bench_child_text(bench_child *child, double seconds) {
+  const double end = bench_now() + seconds;
+  pb_text text = {0};
+  for (;;) {
+    char part[65536];
+    struct pollfd p = {.fd = child->out, .events = POLLIN};
+    const double left = end - bench_now();
+    const bool more = left > 0 && poll(&p, 1, (int)(left * 1e3) + 1) > 0;
+    const ssize_t n = more ? read(child->out, part, sizeof part) : -1;
+    if (n == 0) return text.text ? text.text : pb_text_copy("");
+    if (n < 0) break;
+    pb_text_append_n(&text, part, (size_t)n);
+    if (text.failed) bench_fail("out of memory");
+  }
+  free(text.text);
+  return NULL;
 }
 
 bool bench_child_line(bench_child *child, const char *part, char *line, double seconds) {

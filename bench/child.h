@@ -24,6 +24,9 @@ bench_child bench_fork(void (*work)(void *context, int in, int out), void *conte
 // Reads lines until one holds `part`, into line [512]; false: the output ended, or not in time.
 bool bench_child_line(bench_child *child, const char *part, char *line, double seconds);
 
+// Everything it says to its end, owned by the caller; NULL: not in time.
+char *bench_child_text(bench_child *child, double seconds);
+
 // Exactly `size` octets from a worker; false: it ended, or not in time.
 bool bench_child_read(bench_child *child, void *data, size_t size, double seconds);
 

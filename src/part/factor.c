@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 
 #include "part/supersolve.h"
 
@@ -277,12 +278,24 @@ void pb_factor_forget(pb_factor *f) {
   f->l->xtype = CHOLMOD_PATTERN;
 }
 
+// The factor is the one big piece of memory: in small pages, first touching it and then finding it
+// again in the page tables take a good part of the time. A system that has no large ones ignores
+// the advice.
+static void use_large_pages(void *memory, size_t bytes) {
+  const uintptr_t page = (uintptr_t)2 << 20;
+  uintptr_t begin = ((uintptr_t)memory + page - 1) / page * page;
+  uintptr_t end = ((uintptr_t)memory + bytes) / page * page;
+  if (end > begin) madvise((void *)begin, end - begin, MADV_HUGEPAGE);
+}
+
 pb_status pb_factor_numeric(pb_factor *f, const pb_sparse *a, size_t *weak, double *pivot,
                             pb_error *err) {
   *weak = f->row[0];
   *pivot = 0;
   cholmod_sparse *s = permute(f, a, true);
-  bool ok = s && cholmod_l_factorize(s, f->l, &f->common);
+  bool ok = s && cholmod_l_change_factor(CHOLMOD_REAL, true, true, true, true, f->l, &f->common);
+  if (ok) use_large_pages(f->l->x, f->l->xsize * sizeof(double));
+  ok = ok && cholmod_l_factorize(s, f->l, &f->common);
   cholmod_l_free_sparse(&s, &f->common);
   if (!ok || f->common.status < 0) return fail_cholmod(f, err);
   if (f->l->minor < f->n) {
@@ -303,17 +316,12 @@ static cholmod_dense dense(size_t rows, size_t columns, double *x) {
                          .dtype = CHOLMOD_DOUBLE};
 }
 
-// A solve's room is kept for the next one: the system hands out large pieces page by page, zeroed,
-// which takes as long as using them.
-static pb_status reserve(pb_factor *f, size_t columns, pb_error *err) {
-  size_t wanted = (f->n + f->largest) * columns;
-  if (wanted <= f->room) return PB_OK;
-  free(f->work);
-  f->room = 0;
-  f->work = malloc(wanted * sizeof *f->work);
-  if (!f->work) return pb_fail_memory(err, "stiffness");
-  f->room = wanted;
-  return PB_OK;
+// The room of a narrow solve is kept for the next one: the system hands out large pieces page by
+// page, zeroed, which takes as long as using them.
+static pb_status reserve(pb_factor *f, pb_error *err) {
+  if (f->work) return PB_OK;
+  f->work = malloc((f->n + f->largest) * PB_SUPERSOLVE_WIDTH * sizeof *f->work);
+  return f->work ? PB_OK : pb_fail_memory(err, "stiffness");
 }
 
 static void solve_narrow(pb_factor *f, size_t columns, double *x) {
@@ -328,8 +336,9 @@ static void solve_narrow(pb_factor *f, size_t columns, double *x) {
     for (size_t c = 0; c < columns; c++) x[f->row[i] + c * f->rows] = y[c + i * WIDTH];
 }
 
-static bool solve_wide(pb_factor *f, size_t columns, double *x) {
-  double *y = f->work;
+static pb_status solve_wide(pb_factor *f, size_t columns, double *x, pb_error *err) {
+  double *y = malloc((f->n + f->largest) * columns * sizeof *y);
+  if (!y) return pb_fail_memory(err, "stiffness");
   cholmod_dense by = dense(f->n, columns, y);
   cholmod_dense spare = dense(f->largest, columns, y + f->n * columns);
   for (size_t c = 0; c < columns; c++)
@@ -338,18 +347,15 @@ static bool solve_wide(pb_factor *f, size_t columns, double *x) {
             cholmod_l_super_ltsolve(f->l, &by, &spare, &f->common);
   for (size_t c = 0; ok && c < columns; c++)
     for (size_t i = 0; i < f->n; i++) x[f->row[i] + c * f->rows] = y[i + c * f->n];
-  return ok;
+  free(y);
+  return ok ? PB_OK : fail_cholmod(f, err);
 }
 
 pb_status pb_factor_solve(pb_factor *f, size_t columns, double *x, pb_error *err) {
   bool narrow = columns <= PB_SUPERSOLVE_WIDTH;
-  pb_status st = reserve(f, narrow ? PB_SUPERSOLVE_WIDTH : columns, err);
+  pb_status st = narrow ? reserve(f, err) : solve_wide(f, columns, x, err);
   if (st) return st;
-  if (narrow) {
-    solve_narrow(f, columns, x);
-  } else if (!solve_wide(f, columns, x)) {
-    return fail_cholmod(f, err);
-  }
+  if (narrow) solve_narrow(f, columns, x);
   for (size_t c = 0; c < columns; c++)
     for (size_t i = 0; i < f->rows; i++)
       if (f->place[i] < 0) x[i + c * f->rows] = 0;

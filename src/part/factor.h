@@ -19,8 +19,7 @@ typedef struct pb_factor {
   int64_t *place;     // [rows] place in the elimination order; −1: held
   size_t *row;        // [n] the row at each place
   size_t largest;     // rows of the largest supernode
-  double *work;       // [room] for solves
-  size_t room;
+  double *work;       // for narrow solves, once there was one
 } pb_factor;
 
 // Order and symbolic analysis of pattern `a`, the rows of whose nodes are in dof [3 × nodes] (−1:
