@@ -1,4 +1,4 @@
-// The full model for other programs: K.mtx and M.mtx (Matrix Market), nodes.csv, frames.csv, and
+// The full model for other programs: K.mtx and M.mtx (Matrix Market), nodes.csv, frames.json, and
 // decks for CalculiX: part.inp stores K and M, modes.inp computes the free part's frequencies.
 //
 // Node numbers start at 1; row 3 (n − 1) + d of the matrices is direction d of node n. CalculiX
@@ -9,6 +9,7 @@
 #include <sys/stat.h>
 
 #include "build.h"
+#include "frames.h"
 #include "outfile.h"
 
 enum { PATH = 4096 };
@@ -68,19 +69,12 @@ static pb_status write_nodes(const build *b, const char *directory, pb_error *er
   return sink_close(&s, err);
 }
 
-// Which nodes each frame is tied to, with the area that belongs to each: the weights of the mean.
+// For plantbus-part reduce.
 static pb_status write_frames(const build *b, const char *directory, pb_error *err) {
-  sink s;
-  pb_status st = sink_open(directory, "frames.csv", &s, err);
-  if (st) return st;
-  fprintf(s.stream, "frame,x,y,z,node,area\n");
-  for (size_t f = 0; f < b->fem.frames; f++) {
-    const pb_fem_frame *frame = b->fem.frame + f;
-    for (size_t i = 0; i < frame->nodes; i++)
-      fprintf(s.stream, "%s,%.17g,%.17g,%.17g,%zu,%.17g\n", frame->name, frame->origin[0],
-              frame->origin[1], frame->origin[2], frame->node[i] + 1, frame->moment[4 * i]);
-  }
-  return sink_close(&s, err);
+  char path[PATH];
+  if (snprintf(path, sizeof path, "%s/frames.json", directory) >= PATH)
+    return pb_fail(err, PB_ERR_IO, directory, "the name is too long");
+  return pb_frames_write(&b->fem, path, err);
 }
 
 static void deck_elements(const build *b, FILE *out) {

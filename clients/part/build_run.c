@@ -6,6 +6,7 @@
 
 #include "base/json.h"
 #include "base/text.h"
+#include "blas_threads.h"
 #include "build.h"
 #include "patch.h"
 #include "plant/element.h"
@@ -74,6 +75,7 @@ pb_status build_model(const cJSON *json, build *out, pb_error *err) {
 }
 
 static bool show_progress(void *context, pb_reduce_phase phase, double done, double total) {
+  pb_blas_threads(phase);
   pb_progress_update(context, done, total, pb_reduce_phase_name(phase));
   return true;
 }

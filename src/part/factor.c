@@ -4,6 +4,9 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
+
+#include "part/supersolve.h"
 
 static pb_status fail_cholmod(const pb_factor *f, pb_error *err) {
   if (f->common.status == CHOLMOD_OUT_OF_MEMORY) return pb_fail_memory(err, "stiffness");
@@ -28,6 +31,7 @@ void pb_factor_clear(pb_factor *f) {
   }
   free(f->place);
   free(f->row);
+  free(f->work);
   *f = (pb_factor){0};
 }
 
@@ -215,6 +219,9 @@ static pb_status analyse(pb_factor *f, const pb_sparse *a, pb_error *err) {
     perm[i] = (SuiteSparse_long)i;
   }
   f->l->ordering = CHOLMOD_NATURAL;
+  const SuiteSparse_long *pi = f->l->pi;
+  for (size_t s = 0; s < f->l->nsuper; s++)
+    if ((size_t)(pi[s + 1] - pi[s]) > f->largest) f->largest = (size_t)(pi[s + 1] - pi[s]);
   free(f->row);
   f->row = row;
   return PB_OK;
@@ -271,12 +278,24 @@ void pb_factor_forget(pb_factor *f) {
   f->l->xtype = CHOLMOD_PATTERN;
 }
 
+// The factor is the one big piece of memory: in small pages, first touching it and then finding it
+// again in the page tables take a good part of the time. A system that has no large ones ignores
+// the advice.
+static void use_large_pages(void *memory, size_t bytes) {
+  const uintptr_t page = (uintptr_t)2 << 20;
+  uintptr_t begin = ((uintptr_t)memory + page - 1) / page * page;
+  uintptr_t end = ((uintptr_t)memory + bytes) / page * page;
+  if (end > begin) madvise((void *)begin, end - begin, MADV_HUGEPAGE);
+}
+
 pb_status pb_factor_numeric(pb_factor *f, const pb_sparse *a, size_t *weak, double *pivot,
                             pb_error *err) {
   *weak = f->row[0];
   *pivot = 0;
   cholmod_sparse *s = permute(f, a, true);
-  bool ok = s && cholmod_l_factorize(s, f->l, &f->common);
+  bool ok = s && cholmod_l_change_factor(CHOLMOD_REAL, true, true, true, true, f->l, &f->common);
+  if (ok) use_large_pages(f->l->x, f->l->xsize * sizeof(double));
+  ok = ok && cholmod_l_factorize(s, f->l, &f->common);
   cholmod_l_free_sparse(&s, &f->common);
   if (!ok || f->common.status < 0) return fail_cholmod(f, err);
   if (f->l->minor < f->n) {
@@ -297,20 +316,48 @@ static cholmod_dense dense(size_t rows, size_t columns, double *x) {
                          .dtype = CHOLMOD_DOUBLE};
 }
 
-pb_status pb_factor_solve(pb_factor *f, size_t columns, double *x, pb_error *err) {
-  size_t spare = f->l->maxesize + 1;
-  double *y = malloc((f->n + spare) * (columns + 1) * sizeof *y);
+// The room of a narrow solve is kept for the next one: the system hands out large pieces page by
+// page, zeroed, which takes as long as using them.
+static pb_status reserve(pb_factor *f, pb_error *err) {
+  if (f->work) return PB_OK;
+  f->work = malloc((f->n + f->largest) * PB_SUPERSOLVE_WIDTH * sizeof *f->work);
+  return f->work ? PB_OK : pb_fail_memory(err, "stiffness");
+}
+
+static void solve_narrow(pb_factor *f, size_t columns, double *x) {
+  enum { WIDTH = PB_SUPERSOLVE_WIDTH };
+  double *y = f->work;
+  for (size_t i = 0; i < f->n; i++) {
+    const double *from = x + f->row[i];
+    for (size_t c = 0; c < WIDTH; c++) y[c + i * WIDTH] = c < columns ? from[c * f->rows] : 0;
+  }
+  pb_supersolve(f->l, y, y + f->n * WIDTH);
+  for (size_t i = 0; i < f->n; i++)
+    for (size_t c = 0; c < columns; c++) x[f->row[i] + c * f->rows] = y[c + i * WIDTH];
+}
+
+static pb_status solve_wide(pb_factor *f, size_t columns, double *x, pb_error *err) {
+  double *y = malloc((f->n + f->largest) * columns * sizeof *y);
   if (!y) return pb_fail_memory(err, "stiffness");
-  cholmod_dense by = dense(f->n, columns, y), bspare = dense(spare, columns, y + f->n * columns);
+  cholmod_dense by = dense(f->n, columns, y);
+  cholmod_dense spare = dense(f->largest, columns, y + f->n * columns);
   for (size_t c = 0; c < columns; c++)
     for (size_t i = 0; i < f->n; i++) y[i + c * f->n] = x[f->row[i] + c * f->rows];
-  bool ok = cholmod_l_super_lsolve(f->l, &by, &bspare, &f->common) &&
-            cholmod_l_super_ltsolve(f->l, &by, &bspare, &f->common);
-  if (ok) {
-    memset(x, 0, f->rows * columns * sizeof *x);
-    for (size_t c = 0; c < columns; c++)
-      for (size_t i = 0; i < f->n; i++) x[f->row[i] + c * f->rows] = y[i + c * f->n];
-  }
+  bool ok = cholmod_l_super_lsolve(f->l, &by, &spare, &f->common) &&
+            cholmod_l_super_ltsolve(f->l, &by, &spare, &f->common);
+  for (size_t c = 0; ok && c < columns; c++)
+    for (size_t i = 0; i < f->n; i++) x[f->row[i] + c * f->rows] = y[i + c * f->n];
   free(y);
   return ok ? PB_OK : fail_cholmod(f, err);
+}
+
+pb_status pb_factor_solve(pb_factor *f, size_t columns, double *x, pb_error *err) {
+  bool narrow = columns <= PB_SUPERSOLVE_WIDTH;
+  pb_status st = narrow ? reserve(f, err) : solve_wide(f, columns, x, err);
+  if (st) return st;
+  if (narrow) solve_narrow(f, columns, x);
+  for (size_t c = 0; c < columns; c++)
+    for (size_t i = 0; i < f->rows; i++)
+      if (f->place[i] < 0) x[i + c * f->rows] = 0;
+  return PB_OK;
 }

@@ -18,6 +18,8 @@ typedef struct pb_factor {
   size_t n;           // rows that are not held
   int64_t *place;     // [rows] place in the elimination order; −1: held
   size_t *row;        // [n] the row at each place
+  size_t largest;     // rows of the largest supernode
+  double *work;       // for narrow solves, once there was one
 } pb_factor;
 
 // Order and symbolic analysis of pattern `a`, the rows of whose nodes are in dof [3 × nodes] (−1:

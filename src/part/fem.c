@@ -37,3 +37,37 @@ pb_status pb_fem_frame_weights(const pb_fem *fem, pb_fem_frame *frame, const dou
   frame->moment = moment;
   return PB_OK;
 }
+
+pb_status pb_fem_frame_mass(const pb_fem *fem, pb_fem_frame *frame, pb_error *err) {
+  double *moment = calloc(4 * frame->nodes + 1, sizeof *moment), total = 0;
+  size_t *place = calloc(fem->m.n + 1, sizeof *place);  // of a row's node in the frame, from 1
+  pb_status st = moment && place ? PB_OK : pb_fail_memory(err, frame->name);
+  for (size_t i = 0; !st && i < 3 * frame->nodes; i++) {
+    int64_t row = fem->dof[i % 3 + 3 * frame->node[i / 3]];
+    if (row >= 0) place[row] = 3 * (i / 3 + 1) + i % 3;
+  }
+  for (size_t j = 0; !st && j < fem->m.n; j++) {
+    for (int64_t at = place[j] ? fem->m.start[j] : 0; place[j] && at < fem->m.start[j + 1]; at++) {
+      size_t a = place[fem->m.row[at]], b = place[j];
+      if (!a || a % 3 != b % 3) continue;  // another direction, or not of the frame
+      size_t pair[2] = {a / 3 - 1, b / 3 - 1};
+      for (size_t side = 0; side < (pair[0] == pair[1] ? 1 : 2); side++) {
+        double *to = moment + 4 * pair[side], g = fem->m.value[at] / 3;
+        const double *x = fem->xyz + 3 * frame->node[pair[1 - side]];
+        to[0] += g;
+        for (size_t d = 0; d < 3; d++) to[1 + d] += g * (x[d] - frame->origin[d]);
+        total += g;
+      }
+    }
+  }
+  free(place);
+  if (!st && !(total > 0))
+    st = pb_fail(err, PB_ERR_ARGUMENT, frame->name, "M has no mass at the frame's nodes");
+  if (st) {
+    free(moment);
+    return st;
+  }
+  free(frame->moment);
+  frame->moment = moment;
+  return PB_OK;
+}

@@ -44,6 +44,11 @@ void pb_fem_clear(pb_fem *fem);  // frees all that it holds; a zeroed one is all
 pb_status pb_fem_frame_weights(const pb_fem *fem, pb_fem_frame *frame, const double *w,
                                pb_error *err);
 
+// Moments of the mass that M has between the frame's nodes, direction by direction the same:
+// weights that follow the area of the faces they stand on where elements are of one depth. Fails
+// with PB_ERR_MEMORY, PB_ERR_ARGUMENT (no mass at these nodes). [init]
+pb_status pb_fem_frame_mass(const pb_fem *fem, pb_fem_frame *frame, pb_error *err);
+
 // The number by which messages name a node. [any]
 int64_t pb_fem_node_number(const pb_fem *fem, size_t node);
 

@@ -19,7 +19,7 @@
 enum { BLOCK = 8 };
 
 static const double two_pi = 6.283185307179586476925286766559;
-static const double tolerance = 1e-11;      // of the residual, relative to θ
+static const double tolerance = 1e-10;      // of the residual, relative to θ
 static const double next_tolerance = 1e-3;  // of the first mode that is not kept
 static const double dependent = 1e-12;      // length left of a direction by the basis, to drop it
 
@@ -32,6 +32,7 @@ typedef struct lanczos {
   double *q;                       // full × k
   double *h;                       // room × room, upper triangle: QᵀM A Q
   double *u, *mu;                  // full × BLOCK: block at work and M times it
+  double *spare;                   // full × BLOCK
   double coupling[BLOCK * BLOCK];  // B_j, block × last
   double *theta, *s;               // Ritz values ascending, k × k vectors
   size_t ritz;                     // size of the last decomposition
@@ -76,10 +77,14 @@ static pb_status reserve(lanczos *z, size_t wanted, pb_error *err) {
 
 // ---- one block ----------------------------------------------------------------------------------
 
-// u ← u − Q QᵀM u; what was taken off goes to h (k × columns). mu is M u on return.
-static void orthogonalise(lanczos *z, size_t columns, double *h) {
-  gemm("T", "N", z->k, columns, z->full, 1, z->q, z->full, z->mu, z->full, 0, h, z->k);
-  gemm("N", "N", z->full, columns, z->k, -1, z->q, z->full, h, z->k, 1, z->u, z->full);
+// u ← u − Q QᵀM u with the basis vectors from `first`; what was taken off goes to h (k × columns,
+// zero above). mu is M u on return.
+static void orthogonalise(lanczos *z, size_t first, size_t columns, double *h) {
+  const double *q = z->q + first * z->full;
+  size_t count = z->k - first;
+  memset(h, 0, z->k * columns * sizeof *h);
+  gemm("T", "N", count, columns, z->full, 1, q, z->full, z->mu, z->full, 0, h + first, z->k);
+  gemm("N", "N", z->full, columns, count, -1, q, z->full, h + first, z->k, 1, z->u, z->full);
   reduce_mass_multiply(z->w, columns, z->u, z->mu);
 }
 
@@ -101,15 +106,13 @@ static pb_status normalise(lanczos *z, size_t columns, double least, size_t *kep
       scaled[c + r * columns] = g[c + (first + r) * columns] / length;
     }
   }
-  double *fresh = malloc(z->full * (*kept + 1) * sizeof *fresh);
-  if (!fresh) return pb_fail_memory(err, "modes");
-  double *pair[2] = {z->u, z->mu};
+  double **pair[2] = {&z->u, &z->mu};
   for (size_t i = 0; i < 2; i++) {
-    gemm("N", "N", z->full, *kept, columns, 1, pair[i], z->full, scaled, columns, 0, fresh,
-         z->full);
-    memcpy(pair[i], fresh, z->full * *kept * sizeof *fresh);
+    double *old = *pair[i];
+    gemm("N", "N", z->full, *kept, columns, 1, old, z->full, scaled, columns, 0, z->spare, z->full);
+    *pair[i] = z->spare;
+    z->spare = old;
   }
-  free(fresh);
   return PB_OK;
 }
 
@@ -124,19 +127,20 @@ static double longest(const lanczos *z, size_t columns) {
   return sqrt(largest);
 }
 
-// Makes `columns` vectors in u the next block: orthogonal to the basis, twice, and to each other.
+// Makes `columns` vectors in u the next block: orthogonal to the basis and to each other. They
+// reach the basis from `first` on, the rest of it but for rounding: that falls to the second pass.
 // h (k × columns) is what lay in the basis, the coupling the rest.
-static pb_status append(lanczos *z, size_t columns, double *h, pb_error *err) {
+static pb_status append(lanczos *z, size_t first, size_t columns, double *h, pb_error *err) {
   double b1[BLOCK * BLOCK], b2[BLOCK * BLOCK];
   size_t kept = 0, again = 0;
   double *h2 = malloc((z->k + 1) * BLOCK * sizeof *h2);
   if (!h2) return pb_fail_memory(err, "modes");
   reduce_mass_multiply(z->w, columns, z->u, z->mu);
   double least = dependent * longest(z, columns);
-  orthogonalise(z, columns, h);
+  orthogonalise(z, first, columns, h);
   pb_status st = normalise(z, columns, fmax(least, 1e-290), &kept, b1, err);
   if (!st && kept) {
-    orthogonalise(z, kept, h2);
+    orthogonalise(z, 0, kept, h2);
     gemm("N", "N", z->k, columns, kept, 1, h2, z->k, b1, kept, 1, h, z->k);
     st = normalise(z, kept, 0.5, &again, b2, err);
   }
@@ -162,20 +166,21 @@ static pb_status append_random(lanczos *z, pb_error *err) {
     z->mu[i] = z->w->rigid_row[i % z->full] ? 0 : pb_random_gaussian(&z->random);
   reduce_mass_multiply(z->w, columns, z->mu, z->u);
   pb_status st = reduce_respond(z->w, columns, z->u, err);
-  if (!st) st = append(z, columns, h, err);
+  if (!st) st = append(z, 0, columns, h, err);
   if (!st) z->last = 0;  // nothing of A Q leads to it
   free(h);
   return st;
 }
 
-// One application of the operator to the newest block.
+// One application of the operator to the newest block; being symmetric, it leads back to the block
+// before and no further.
 static pb_status extend(lanczos *z, pb_error *err) {
   size_t columns = z->block, k = z->k;
   double *h = malloc((k + 1) * BLOCK * sizeof *h);
   if (!h) return pb_fail_memory(err, "modes");
   memcpy(z->u, z->mu, columns * z->full * sizeof *z->u);
   pb_status st = reduce_respond(z->w, columns, z->u, err);
-  if (!st) st = append(z, columns, h, err);
+  if (!st) st = append(z, k - columns - z->last, columns, h, err);
   for (size_t c = 0; !st && c < columns; c++)
     memcpy(z->h + (k - columns + c) * z->room, h + c * k, k * sizeof *h);
   free(h);
@@ -357,12 +362,14 @@ pb_status reduce_modes(reduce_work *w, pb_error *err) {
   pb_random_seed(&z.random, 1, 0);
   z.u = malloc(w->full * BLOCK * sizeof *z.u);
   z.mu = malloc(w->full * BLOCK * sizeof *z.mu);
-  if (!st && (!z.u || !z.mu)) st = pb_fail_memory(err, w->fem->name);
+  z.spare = malloc(w->full * BLOCK * sizeof *z.spare);
+  if (!st && (!z.u || !z.mu || !z.spare)) st = pb_fail_memory(err, w->fem->name);
   if (!st) st = run(&z, err);
   free(z.q);
   free(z.h);
   free(z.u);
   free(z.mu);
+  free(z.spare);
   free(z.theta);
   free(z.s);
   return st;

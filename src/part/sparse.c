@@ -122,21 +122,31 @@ void pb_sparse_multiply(const pb_sparse *a, size_t columns, const double *x, dou
   }
 }
 
-void pb_sparse_multiply_triple(const pb_sparse *a, size_t columns, const double *x, double *y) {
-  size_t n = a->n;
-  memset(y, 0, 3 * n * columns * sizeof *y);
-  for (size_t c = 0; c < columns; c++, x += 3 * n, y += 3 * n) {
-    for (size_t j = 0; j < n; j++) {
-      const double *xj = x + 3 * j;
-      double *yj = y + 3 * j, sum[3] = {0};
-      for (int64_t at = a->start[j]; at < a->start[j + 1]; at++) {
-        size_t i = (size_t)a->row[at];
-        double v = a->value[at];
-        for (int d = 0; d < 3; d++) sum[d] += v * x[3 * i + d];
-        if (i == j) continue;
-        for (int d = 0; d < 3; d++) y[3 * i + d] += v * xj[d];
+// `columns` of them at once: an entry is read for all.
+static inline void multiply_triple(const pb_sparse *a, size_t columns, const double *x, double *y) {
+  size_t n = a->n, ld = 3 * n;
+  for (size_t j = 0; j < n; j++) {
+    double own[4][3], sum[4][3] = {{0}};
+    for (size_t c = 0; c < columns; c++)
+      for (size_t d = 0; d < 3; d++) own[c][d] = x[3 * j + d + c * ld];
+    for (int64_t at = a->start[j]; at < a->start[j + 1]; at++) {
+      size_t i = (size_t)a->row[at];
+      double v = a->value[at], w = i == j ? 0 : v;
+      const double *xi = x + 3 * i;
+      double *yi = y + 3 * i;
+      for (size_t c = 0; c < columns; c++, xi += ld, yi += ld) {
+        for (size_t d = 0; d < 3; d++) sum[c][d] += v * xi[d];
+        for (size_t d = 0; d < 3; d++) yi[d] += w * own[c][d];
       }
-      for (int d = 0; d < 3; d++) yj[d] += sum[d];
     }
+    for (size_t c = 0; c < columns; c++)
+      for (size_t d = 0; d < 3; d++) y[3 * j + d + c * ld] += sum[c][d];
   }
+}
+
+void pb_sparse_multiply_triple(const pb_sparse *a, size_t columns, const double *x, double *y) {
+  size_t ld = 3 * a->n;
+  memset(y, 0, ld * columns * sizeof *y);
+  for (; columns >= 4; columns -= 4, x += 4 * ld, y += 4 * ld) multiply_triple(a, 4, x, y);
+  for (; columns; columns--, x += ld, y += ld) multiply_triple(a, 1, x, y);
 }

@@ -187,11 +187,169 @@ static void test_band(void **state) {
   }
 }
 
+// Forty equal resonators, each on a spring of its own: one frequency forty times, five times what a
+// block of the iteration can see at once. The count finds those that are missing.
+static void test_many_equal(void **state) {
+  (void)state;
+  enum { MASSES = 40 };
+  pb_fem fem;
+  assert_int_equal(truss_build(45, 0.6, true, 9, &fem), 0);
+  assert_int_equal(truss_frame(&fem, "left", PB_TIE_RIGID, 0, 0, 0.4), 0);
+  assert_int_equal(truss_frame(&fem, "right", PB_TIE_RIGID, 0, 0.6, 1), 0);
+  assert_int_equal(truss_hang(&fem, MASSES, fem.frame[0].node[0], 20, 0.05), 0);
+  double *omega2;
+  size_t count, equal = 0;
+  assert_int_equal(dense_fixed(&fem, &omega2, &count), 0);
+  while (omega2[equal] < 1.000001 * omega2[0]) equal++;
+  assert_true(equal >= 3 * MASSES);
+  pb_reduce_options options = {.max_hz = 1.5 * sqrt(omega2[0]) / two_pi};
+  pb_reduction *r = NULL;
+  REQUIRE(pb_reduce(&fem, &options, false, &r, &err));
+  assert_int_equal(r->modes, equal);
+  for (size_t i = 0; i < equal; i++)
+    ASSERT_RELATIVE(r->fixed_hz[i], sqrt(omega2[0]) / two_pi, 1e-9);
+  pb_reduction_free(r);
+  free(omega2);
+  pb_fem_clear(&fem);
+}
+
+static void expect_refusal(const pb_fem *fem, pb_status status, const char *says) {
+  pb_reduce_options options = {.modes = 3};
+  pb_reduction *r = NULL;
+  pb_error err = {0};
+  assert_int_equal(pb_reduce(fem, &options, false, &r, &err), status);
+  assert_null(r);
+  print_message("%s: %s\n", err.where, err.message);
+  if (!strstr(err.message, says)) fail_msg("'%s' does not say '%s'", err.message, says);
+}
+
+static void test_refusals(void **state) {
+  (void)state;
+  pb_fem fem;
+  static const double origin[3] = {0};
+  assert_int_equal(truss_build(30, 0.6, true, 2, &fem), 0);
+  expect_refusal(&fem, PB_ERR_ARGUMENT, "no interface frame");
+  assert_int_equal(truss_frame(&fem, "left", PB_TIE_AVERAGED, 0, 0, 0.5), 0);
+  // Twice the same averages: no forces can tell them apart.
+  assert_int_equal(truss_frame(&fem, "again", PB_TIE_AVERAGED, 0, 0, 0.5), 0);
+  expect_refusal(&fem, PB_ERR_SINGULAR, "depend on each other");
+  truss_drop_frame(&fem);
+  // Two nodes lie on a line whatever they are.
+  static const size_t two[2] = {4, 9};
+  assert_int_equal(truss_frame_of(&fem, "line", PB_TIE_AVERAGED, origin, two, 2, NULL), 0);
+  expect_refusal(&fem, PB_ERR_ARGUMENT, "line");
+  truss_drop_frame(&fem);
+  assert_int_equal(truss_frame_of(&fem, "line", PB_TIE_RIGID, origin, two, 2, NULL), 0);
+  expect_refusal(&fem, PB_ERR_ARGUMENT, "line");
+  truss_drop_frame(&fem);
+  // Rigid frames that share a node.
+  assert_int_equal(truss_frame(&fem, "a", PB_TIE_RIGID, 0, 0, 0.3), 0);
+  assert_int_equal(truss_frame(&fem, "b", PB_TIE_RIGID, 0, 0.1, 0.5), 0);
+  expect_refusal(&fem, PB_ERR_ARGUMENT, "two rigid frames");
+  truss_drop_frame(&fem);
+  truss_drop_frame(&fem);
+  int64_t kept = fem.dof[5];
+  fem.dof[5] = fem.dof[6];
+  expect_refusal(&fem, PB_ERR_ARGUMENT, "another node's");
+  fem.dof[5] = -1;
+  expect_refusal(&fem, PB_ERR_ARGUMENT, "belongs to no node");
+  fem.dof[5] = kept;
+  double value = fem.m.value[3];
+  fem.m.value[3] = NAN;
+  expect_refusal(&fem, PB_ERR_ARGUMENT, "not finite");
+  fem.m.value[3] = value;
+  pb_fem_clear(&fem);
+}
+
+// A node on a single spring swings freely; two clusters without a spring between them drift apart.
+static void test_mechanisms(void **state) {
+  (void)state;
+  pb_fem fem;
+  assert_int_equal(truss_build(40, 0.5, true, 4, &fem), 0);
+  assert_int_equal(truss_swing(&fem), 0);
+  assert_int_equal(truss_frame(&fem, "left", PB_TIE_AVERAGED, 0, 0, 0.4), 0);
+  expect_refusal(&fem, PB_ERR_SINGULAR, "node 41");
+  pb_fem_clear(&fem);
+
+  assert_int_equal(truss_build(40, 0.5, true, 4, &fem), 0);
+  assert_int_equal(truss_twin(&fem), 0);
+  assert_int_equal(truss_frame(&fem, "left", PB_TIE_AVERAGED, 0, 0, 0.4), 0);
+  expect_refusal(&fem, PB_ERR_SINGULAR, "falls into pieces: node 41");
+  truss_drop_frame(&fem);
+  // Rigid frames on both hold them together.
+  assert_int_equal(truss_frame(&fem, "left", PB_TIE_RIGID, 0, 0, 0.3), 0);
+  assert_int_equal(truss_frame(&fem, "right", PB_TIE_RIGID, 0, 0.7, 1), 0);
+  check_against_dense(&fem, 6, "two pieces on rigid frames");
+  pb_fem_clear(&fem);
+}
+
+static bool stop_at(void *context, pb_reduce_phase phase, double done, double total) {
+  (void)done;
+  (void)total;
+  return phase != *(const pb_reduce_phase *)context;
+}
+
+// Stopped in each phase: nothing is handed out, nothing leaks.
+static void test_stop(void **state) {
+  (void)state;
+  pb_fem fem;
+  assert_int_equal(truss_build(40, 0.5, true, 5, &fem), 0);
+  assert_int_equal(truss_frame(&fem, "left", PB_TIE_AVERAGED, 0, 0, 0.4), 0);
+  for (pb_reduce_phase phase = 0; phase < PB_REDUCE_PHASES; phase++) {
+    pb_reduce_options options = {
+        .modes = 4, .check_points = 1, .progress = stop_at, .context = &phase};
+    pb_reduction *r = NULL;
+    pb_error err = {0};
+    assert_int_equal(pb_reduce(&fem, &options, false, &r, &err), PB_ERR_STATE);
+    assert_null(r);
+  }
+  pb_fem_clear(&fem);
+}
+
+// A clamped–clamped bar of square section without lateral contraction: axial frequencies
+// n/(2L) √(E/ρ) are those of the wave equation, torsion's too, and bending ones come in equal pairs
+// near Timoshenko's.
+static void test_square_bar(void **state) {
+  (void)state;
+  pb_fem fem;
+  const double length = 0.1, side = 0.01;
+  assert_int_equal(bar_build(length, side, 20, 2, &fem), 0);
+  assert_int_equal(truss_frame(&fem, "left", PB_TIE_RIGID, 0, -1e-9, 1e-9), 0);
+  assert_int_equal(truss_frame(&fem, "right", PB_TIE_RIGID, 0, length - 1e-9, length + 1e-9), 0);
+  pb_reduce_options options = {.max_hz = 60e3, .check_points = 2};
+  pb_reduction *r = NULL;
+  REQUIRE(pb_reduce(&fem, &options, false, &r, &err));
+  // Element: two frames hold axial stiffness E A / L between them, bending 12 E I / L³ less shear.
+  double axial = 200e9 * side * side / length;
+  ASSERT_RELATIVE(r->k[0], axial, 1e-6);
+  ASSERT_RELATIVE(r->k[6], -axial, 1e-6);
+  double inertia = side * side * side * side / 12,
+         phi = 12 * 2.0 * inertia / (5.0 / 6 * side * side) / (length * length);  // E/G = 2
+  ASSERT_RELATIVE(r->k[1 + r->size], 12 * 200e9 * inertia / pow(length, 3) / (1 + phi), 0.01);
+  ASSERT_RELATIVE(r->mass, 7800 * side * side * length, 1e-9);
+  double wave = sqrt(200e9 / 7800) / (2 * length);
+  size_t axial_found = 0, pairs = 0;
+  for (size_t i = 0; i < r->modes; i++) {
+    for (int n = 1; n <= 2; n++) axial_found += fabs(r->fixed_hz[i] / (n * wave) - 1) < 3e-5;
+    pairs += i && r->fixed_hz[i] / r->fixed_hz[i - 1] - 1 < 1e-9;
+  }
+  print_message("bar: %zu modes, axial %zu, equal pairs %zu, check %.1e\n", r->modes, axial_found,
+                pairs, r->check[1].error);
+  assert_int_equal(axial_found, 2);
+  assert_true(pairs >= 4);
+  assert_true(r->check[0].error < 0.02 && r->check[0].error > 0);
+  pb_reduction_free(r);
+  pb_fem_clear(&fem);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_averaged),  cmocka_unit_test(test_rigid),
-      cmocka_unit_test(test_mixed),     cmocka_unit_test(test_no_modes),
-      cmocka_unit_test(test_all_modes), cmocka_unit_test(test_band),
+      cmocka_unit_test(test_averaged),   cmocka_unit_test(test_rigid),
+      cmocka_unit_test(test_mixed),      cmocka_unit_test(test_no_modes),
+      cmocka_unit_test(test_all_modes),  cmocka_unit_test(test_band),
+      cmocka_unit_test(test_many_equal), cmocka_unit_test(test_refusals),
+      cmocka_unit_test(test_mechanisms), cmocka_unit_test(test_stop),
+      cmocka_unit_test(test_square_bar),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -9,6 +9,7 @@
 
 #include "base/lapack.h"
 #include "base/text.h"
+#include "part/mesh.h"
 #include "signal/random.h"
 
 // ---- nets ---------------------------------------------------------------------------------------
@@ -85,6 +86,130 @@ int truss_build(size_t nodes, double reach, bool scalar, unsigned seed, pb_fem *
   release(&k);
   release(&m);
   return failed;
+}
+
+// The net with more nodes: old entries first, `nodes` with three rows each.
+static int grow(pb_fem *fem, size_t nodes, entries *k, entries *m, size_t room) {
+  size_t old = fem->nodes;
+  double *xyz = realloc(fem->xyz, 3 * nodes * sizeof *xyz);
+  if (xyz) fem->xyz = xyz;
+  int64_t *dof = realloc(fem->dof, 3 * nodes * sizeof *dof);
+  if (dof) fem->dof = dof;
+  size_t kept = (size_t)(fem->k.start[fem->k.n] + fem->m.start[fem->m.n]);
+  if (!xyz || !dof || allocate(k, kept + room) || allocate(m, kept + room)) return -1;
+  for (size_t i = 3 * old; i < 3 * nodes; i++) fem->dof[i] = (int64_t)i;
+  for (size_t j = 0; j < fem->k.n; j++) {
+    for (int64_t at = fem->k.start[j]; at < fem->k.start[j + 1]; at++)
+      add(k, (size_t)fem->k.row[at], j, fem->k.value[at]);
+    for (int64_t at = fem->m.start[j]; at < fem->m.start[j + 1]; at++)
+      add(m, (size_t)fem->m.row[at], j, fem->m.value[at]);
+  }
+  fem->nodes = nodes;
+  return 0;
+}
+
+static int rebuild(pb_fem *fem, entries *k, entries *m) {
+  pb_error err;
+  pb_sparse_clear(&fem->k);
+  pb_sparse_clear(&fem->m);
+  size_t n = 3 * fem->nodes;
+  int failed = pb_sparse_from_entries(n, k->count, k->row, k->col, k->value, &fem->k, &err) ||
+               pb_sparse_from_entries(n, m->count, m->row, m->col, m->value, &fem->m, &err);
+  release(k);
+  release(m);
+  return failed;
+}
+
+int truss_hang(pb_fem *fem, size_t count, size_t node, double stiffness, double mass) {
+  entries k, m;
+  size_t old = fem->nodes;
+  if (grow(fem, old + count, &k, &m, 9 * count)) return -1;
+  for (size_t i = old; i < old + count; i++) {
+    for (size_t a = 0; a < 3; a++) {
+      // At the same place, so that a rigid motion stretches no spring.
+      fem->xyz[a + 3 * i] = fem->xyz[a + 3 * node];
+      add(&k, 3 * node + a, 3 * node + a, stiffness);
+      add(&k, 3 * node + a, 3 * i + a, -stiffness);
+      add(&k, 3 * i + a, 3 * i + a, stiffness);
+      add(&m, 3 * i + a, 3 * i + a, mass);
+    }
+  }
+  return rebuild(fem, &k, &m);
+}
+
+int truss_swing(pb_fem *fem) {
+  entries k, m;
+  size_t i = fem->nodes;
+  if (grow(fem, i + 1, &k, &m, 64)) return -1;
+  static const double off[3] = {0.05, 0.03, 0.02};
+  for (size_t a = 0; a < 3; a++) fem->xyz[a + 3 * i] = fem->xyz[a] + off[a];
+  add_spring(&k, &m, fem->xyz, 0, i, true, 1e6);
+  return rebuild(fem, &k, &m);
+}
+
+int truss_twin(pb_fem *fem) {
+  entries k, m;
+  size_t old = fem->nodes, count_k = 0, count_m = 0;
+  if (grow(fem, 2 * old, &k, &m, (size_t)(fem->k.start[fem->k.n] + fem->m.start[fem->m.n])))
+    return -1;
+  memcpy(fem->xyz + 3 * old, fem->xyz, 3 * old * sizeof *fem->xyz);
+  count_k = k.count;
+  count_m = m.count;
+  for (size_t e = 0; e < count_k; e++)
+    add(&k, (size_t)k.row[e] + 3 * old, (size_t)k.col[e] + 3 * old, k.value[e]);
+  for (size_t e = 0; e < count_m; e++)
+    add(&m, (size_t)m.row[e] + 3 * old, (size_t)m.col[e] + 3 * old, m.value[e]);
+  return rebuild(fem, &k, &m);
+}
+
+// ---- bar ----------------------------------------------------------------------------------------
+
+typedef struct bar {
+  const pb_section *section;
+  double length;
+  size_t layers;
+} bar;
+
+static void place_bar(const void *context, size_t node, size_t half_level, double xyz[3]) {
+  const bar *b = context;
+  xyz[0] = b->length * (double)half_level / (double)(2 * b->layers);
+  xyz[1] = b->section->at[node].x;
+  xyz[2] = b->section->at[node].y;
+}
+
+static int bar_region(const void *context, size_t quad, size_t layer) {
+  (void)context;
+  (void)quad;
+  (void)layer;
+  return 0;
+}
+
+int bar_build(double length, double side, size_t along, size_t across, pb_fem *fem) {
+  static const pb_material material = {200e9, 0, 7800};
+  pb_error err;
+  double h = side / 2;
+  pb_section section = {.tolerance = 1e-9};
+  pb_block block = {.corner = {{-h, -h}, {h, -h}, {h, h}, {-h, h}}, .cells = {across, across}};
+  bar b = {&section, length, along};
+  pb_extrusion extrusion = {along, place_bar, bar_region, &b};
+  pb_mesh mesh = {0};
+  *fem = (pb_fem){0};
+  int failed = pb_section_add(&section, &block, false, false, &err) ||
+               pb_mesh_extrude(&section, &extrusion, &mesh, &err) ||
+               pb_mesh_assemble(&mesh, 1, &material, fem, &err);
+  pb_section_clear(&section);
+  pb_mesh_clear(&mesh);
+  if (!failed && !fem->name) fem->name = pb_text_copy("bar");
+  return failed;
+}
+
+// ---- frames -------------------------------------------------------------------------------------
+
+void truss_drop_frame(pb_fem *fem) {
+  pb_fem_frame *frame = &fem->frame[--fem->frames];
+  free(frame->name);
+  free(frame->node);
+  free(frame->moment);
 }
 
 int truss_frame_of(pb_fem *fem, const char *name, pb_frame_tie tie, const double origin[3],

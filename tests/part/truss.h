@@ -16,6 +16,22 @@ int truss_frame(pb_fem *fem, const char *name, pb_frame_tie tie, size_t axis, do
 int truss_frame_of(pb_fem *fem, const char *name, pb_frame_tie tie, const double origin[3],
                    const size_t *node, size_t nodes, const double *weight);
 
+void truss_drop_frame(pb_fem *fem);  // the last one
+
+// Adds `count` masses (kg), each on three springs (N/m) along x, y and z to a
+// node.
+int truss_hang(pb_fem *fem, size_t count, size_t node, double stiffness, double mass);
+
+// Adds one node on a single spring.
+int truss_swing(pb_fem *fem);
+
+// Adds a copy of the whole net that nothing connects with it.
+int truss_twin(pb_fem *fem);
+
+// A bar along x of square section, y and z in ± side/2: E 200 GPa, no lateral contraction, 7800
+// kg/m³; 20-node elements, `along` × `across`².
+int bar_build(double length, double side, size_t along, size_t across, pb_fem *fem);
+
 // Dense K, M [size²] of the element with p modes, ω² [p] ascending, by a null space of the
 // constraints (SVD) and dense eigenvalues. The caller frees them. Returns 0 or nonzero.
 int dense_reduce(const pb_fem *fem, size_t p, double **k, double **m, double **omega2);
