@@ -311,7 +311,7 @@ static void test_wrong_files(void **state) {
   refuse("\"body\"", "\"shell\"", "/materials/shell");
   refuse("averaged", "mean", "/frames/tie");
   refuse("\"density\": 1}", "\"density\": 99}", "/mesh/density");
-  refuse("30,", "0,", "/modes");
+  refuse("\"modes\": 6", "\"modes\": 0", "/modes");
   refuse("shear_stiffness", "amplification", "/published/amplification");
   refuse("plantbus.part/1", "plantbus.plant/1", "/schema");
   refuse("\"flexible_joint\"", "\"joint\"", "/type");
