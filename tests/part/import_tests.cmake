@@ -11,3 +11,7 @@ pb_test(part_import LABELS unit SOURCES test_import.c ../support/outside.c ../su
 pb_test(fault_import LABELS fault SOURCES ../fault/test_import_faults.c ../support/outside.c
         ../support/beam.c LIBS plantbus_part PkgConfig::MATIO TIMEOUT 300)
 target_link_options(fault_import PRIVATE -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc)
+
+pb_test(part_import_tool LABELS e2e SOURCES test_import_tool.c part_run.c ../support/outside.c
+        ../support/beam.c LIBS plantbus_part cjson PkgConfig::MATIO)
+add_dependencies(part_import_tool plantbus-part plantbus-model)
