@@ -185,6 +185,12 @@ static pb_status examine(visit *v, pb_error *err) {
 
 // ---- text ---------------------------------------------------------------------------------------
 
+static void row_of_counts(pb_table *t, const visit *v, const char *name,
+                          double (*of)(const stage *)) {
+  pb_table_text(t, name);
+  for (size_t k = 0; k < v->stages; k++) pb_table_count(t, (size_t)of(&v->stage[k]));
+}
+
 static void row(pb_table *t, const visit *v, const char *name, double (*of)(const stage *)) {
   pb_table_text(t, name);
   for (size_t k = 0; k < v->stages; k++) pb_table_number(t, of(&v->stage[k]));
@@ -235,8 +241,8 @@ static pb_status print_table(const visit *v, pb_error *err) {
   char held[64];
   pb_table_text_column(&t, "");
   for (size_t k = 0; k < v->stages; k++) pb_table_number_column(&t, v->stage[k].name, NULL, 5);
-  row(&t, v, "significant digits of K", digits_k);
-  row(&t, v, "significant digits of M", digits_m);
+  row_of_counts(&t, v, "significant digits of K", digits_k);
+  row_of_counts(&t, v, "significant digits of M", digits_m);
   row(&t, v, "asymmetry", asymmetry);
   row(&t, v, "K against translations", translation);
   row(&t, v, "K against rotations", rotation);

@@ -168,7 +168,8 @@ static bool frame_index(const job *j, int64_t node, size_t *at) {
 // have no coordinates.
 static bool is_modal(const job *j, size_t row) {
   size_t at;
-  return !j->label[row].direction || (j->r->modal > 0 && !listed(j, j->label[row].node, &at));
+  bool told = j->k.label && j->r->modal > 0;
+  return !j->label[row].direction || (told && !listed(j, j->label[row].node, &at));
 }
 
 static pb_status collect_frames(job *j) {

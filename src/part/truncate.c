@@ -14,13 +14,15 @@ static const double two_pi = 6.283185307179586476925286766559;
 typedef struct interior {
   size_t b, p;    // coordinates of the frames, modes
   double *k, *m;  // (b + p)², frames first; K is block diagonal
-  double *hz;     // [p]
+  double *hz;     // [p] ascending
+  size_t *order;  // [p] modes by what they do to the frames in the band, most first
 } interior;
 
 static void clear_interior(interior *x) {
   free(x->k);
   free(x->m);
   free(x->hz);
+  free(x->order);
   *x = (interior){0};
 }
 
@@ -119,18 +121,70 @@ static pb_status make_interior(const char *name, const pb_element_data *e, inter
   return st;
 }
 
+typedef struct ranked {
+  double weight;
+  size_t mode;
+} ranked;
+
+static int by_weight(const void *a, const void *b) {
+  const ranked *x = a, *y = b;
+  if (x->weight != y->weight) return x->weight < y->weight ? 1 : -1;
+  return (x->mode > y->mode) - (x->mode < y->mode);
+}
+
+// A mode adds −ω⁴ M_bq M_qb / (ω_q² − ω²) to the frames' dynamic stiffness: its size at the band's
+// end against ω² M_bb, the largest over the frames' coordinates. Modes of the band come first.
+static pb_status rank_modes(const char *name, interior *x, double high_hz, pb_error *err) {
+  ranked *list = malloc((x->p + 1) * sizeof *list);
+  x->order = malloc((x->p + 1) * sizeof *x->order);
+  if (!list || !x->order) {
+    free(list);
+    return pb_fail_memory(err, name);
+  }
+  size_t n = x->b + x->p;
+  for (size_t q = 0; q < x->p; q++) {
+    double ratio = pow(x->hz[q] / high_hz, 2), share = 0;
+    for (size_t i = 0; i < x->b; i++) {
+      double mass = x->m[i + i * n], coupling = x->m[i + (x->b + q) * n];
+      if (mass > 0) share = fmax(share, coupling * coupling / mass);
+    }
+    list[q] = (ranked){ratio > 1.5 ? share / (ratio - 1) : INFINITY, q};
+  }
+  qsort(list, x->p, sizeof *list, by_weight);
+  for (size_t q = 0; q < x->p; q++) x->order[q] = list[q].mode;
+  free(list);
+  return PB_OK;
+}
+
+static int ascending(const void *a, const void *b) {
+  size_t x = *(const size_t *)a, y = *(const size_t *)b;
+  return (x > y) - (x < y);
+}
+
+// The first `modes` of the ranking, by frequency.
 static pb_status take_modes(const char *name, const pb_element_data *e, const interior *x,
                             size_t modes, pb_element_data *out, pb_error *err) {
   size_t n = x->b + modes, whole = x->b + x->p;
   *out = (pb_element_data){.frames = e->frames, .size = n};
   out->position = malloc(3 * e->frames * sizeof *out->position);
-  out->k = block(x->k, whole, 0, n, 0, n);
-  out->m = block(x->m, whole, 0, n, 0, n);
-  if (!out->position || !out->k || !out->m) {
+  out->k = malloc(n * n * sizeof *out->k);
+  out->m = malloc(n * n * sizeof *out->m);
+  size_t *from = malloc(n * sizeof *from);
+  if (!out->position || !out->k || !out->m || !from) {
+    free(from);
     pb_element_data_clear(out);
     return pb_fail_memory(err, name);
   }
   memcpy(out->position, e->position, 3 * e->frames * sizeof *out->position);
+  for (size_t i = 0; i < n; i++) from[i] = i < x->b ? i : x->b + x->order[i - x->b];
+  qsort(from, n, sizeof *from, ascending);
+  for (size_t j = 0; j < n; j++) {
+    for (size_t i = 0; i < n; i++) {
+      out->k[i + j * n] = x->k[from[i] + from[j] * whole];
+      out->m[i + j * n] = x->m[from[i] + from[j] * whole];
+    }
+  }
+  free(from);
   return PB_OK;
 }
 
@@ -223,7 +277,8 @@ static pb_status finish(const trial *t, size_t modes, pb_truncation *out) {
   out->fixed_hz = malloc((modes + 1) * sizeof *out->fixed_hz);
   if (out->row && out->fixed_hz) {
     out->rows = compare(&t->before, &after, t->o, out->row, &out->worst_zero, &out->worst_pole);
-    memcpy(out->fixed_hz, t->x.hz, modes * sizeof *out->fixed_hz);
+    for (size_t q = 0; q < modes; q++)  // K is ω² there
+      out->fixed_hz[q] = sqrt(out->element.k[(t->x.b + q) * (out->element.size + 1)]) / two_pi;
   } else {
     st = pb_fail_memory(t->err, t->name);
   }
@@ -264,6 +319,7 @@ pb_status pb_element_truncate(const char *name, const pb_element_data *data,
   *out = (pb_truncation){0};
   pb_status st = check(name, data, options, err);
   if (!st) st = make_interior(name, data, &t.x, err);
+  if (!st) st = rank_modes(name, &t.x, options->high_hz, err);
   if (!st) st = pb_proof_make(name, data, options, &t.before, err);
   if (!st && !modes) st = choose(&t, &modes);
   if (!st) st = finish(&t, modes, out);

@@ -2,7 +2,8 @@
 //
 // The element's own interior (its modal rows i) is reduced once more with its frames b held:
 //   Ψ = −K_ii⁻¹K_ib,  K_ii φ = ω² M_ii φ,  T = [[I, 0], [Ψ, Φ_k]],  K ← TᵀKT,  M ← TᵀMT
-// and only the k lowest φ are kept. T holds the static answer to every motion of the frames, so
+// and only k of the φ are kept: those of the band and those that move the frames' dynamic stiffness
+// most in it. T holds the static answer to every motion of the frames, so
 // that the stiffness between frames, the static residual of what goes, stays exactly; modal
 // truncation of the free or held part would lose it and move the zeros of collocated and force
 // sensors far away.

@@ -165,11 +165,12 @@ static int magnitude_order(const void *a, const void *b) {
 }
 
 // rigid [6] and the first flexible frequency; NaN where M is not definite, which was judged before.
-static pb_status measure_rigid_hz(const char *name, const pb_element_data *w, double *rigid,
-                                  double *flexible, pb_error *err) {
+static pb_status measure_rigid_hz(const char *name, const pb_element_data *w, const double *omega2,
+                                  double *rigid, double *flexible, pb_error *err) {
   double *hz = malloc(w->size * sizeof *hz);
   if (!hz) return pb_fail_memory(err, name);
-  pb_status st = pb_measure_modes(name, w->size, w->k, w->m, hz, NULL, err);
+  pb_status st = omega2 ? PB_OK : pb_measure_modes(name, w->size, w->k, w->m, hz, NULL, err);
+  for (size_t i = 0; omega2 && i < w->size; i++) hz[i] = pb_signed_hz(omega2[i]);
   if (!st) qsort(hz, w->size, sizeof *hz, magnitude_order);
   for (int k = 0; k < 6; k++) rigid[k] = st ? NAN : hz[k];
   *flexible = st ? NAN : w->size > 6 ? hz[6] : INFINITY;
@@ -211,7 +212,7 @@ static pb_status treat_rigid(const char *name, pb_element_data *w, const pb_doct
                              pb_diagnosis *d, pb_error *err) {
   double rigid[6], flexible;
   if (!curable(d)) return PB_OK;
-  pb_status st = measure_rigid_hz(name, w, rigid, &flexible, err);
+  pb_status st = measure_rigid_hz(name, w, NULL, rigid, &flexible, err);
   if (st) return st;
   bool bad = !moves_freely(rigid, flexible);
   if (!bad && !has(d, PB_FINDING_FEW_DIGITS)) return PB_OK;
@@ -229,8 +230,9 @@ static pb_status treat_rigid(const char *name, pb_element_data *w, const pb_doct
   return st;
 }
 
-static pb_status walk(const char *name, pb_element_data *w, const pb_doctor_options *options,
-                      pb_diagnosis *d, pb_error *err) {
+// omega2: the free eigenvalues where they are known, and with them that M is positive definite.
+static pb_status walk(const char *name, pb_element_data *w, const double *omega2,
+                      const pb_doctor_options *options, pb_diagnosis *d, pb_error *err) {
   size_t n = w->size;
   if (!check_numbers(w, d)) return PB_OK;
   d->digits_k = pb_measure_digits(w->k, n);
@@ -242,17 +244,17 @@ static pb_status walk(const char *name, pb_element_data *w, const pb_doctor_opti
   treat_asymmetry(w->k, n, "K", d->digits_k, d);
   treat_asymmetry(w->m, n, "M", d->digits_m, d);
   note_digits(d);
-  pb_status st = treat_mass(name, w, d, err);
-  if (!st) st = measure_rigid_hz(name, w, d->rigid_hz, &d->flexible_hz, err);
+  pb_status st = omega2 ? PB_OK : treat_mass(name, w, d, err);
+  if (!st) st = measure_rigid_hz(name, w, omega2, d->rigid_hz, &d->flexible_hz, err);
   if (!st) st = treat_frames(name, w, d, err);
   if (!st) treat_units(w, options, d);
   if (!st) st = treat_rigid(name, w, options, d, err);
   return st;
 }
 
-pb_status pb_element_diagnose(const char *name, const pb_element_data *data,
-                              const pb_doctor_options *options, pb_diagnosis *out,
-                              pb_element_data *cured, pb_error *err) {
+static pb_status diagnose(const char *name, const pb_element_data *data, const double *omega2,
+                          const pb_doctor_options *options, pb_diagnosis *out,
+                          pb_element_data *cured, pb_error *err) {
   static const pb_doctor_options none;
   pb_element_data w;
   *out = (pb_diagnosis){.frames = data->frames, .size = data->size, .mass_smallest = NAN};
@@ -261,7 +263,7 @@ pb_status pb_element_diagnose(const char *name, const pb_element_data *data,
   if (cured) *cured = (pb_element_data){0};
   pb_status st = copy_data(name, data, &w, err);
   if (st) return st;
-  st = walk(name, &w, options ? options : &none, out, err);
+  st = walk(name, &w, omega2, options ? options : &none, out, err);
   for (size_t k = 0; !st && cured && k < out->findings; k++)
     if (!out->finding[k].curable)
       st = pb_fail(err, PB_ERR_ELEMENT, name, "cannot be repaired: %s", out->finding[k].saw);
@@ -273,13 +275,19 @@ pb_status pb_element_diagnose(const char *name, const pb_element_data *data,
   return st;
 }
 
+pb_status pb_element_diagnose(const char *name, const pb_element_data *data,
+                              const pb_doctor_options *options, pb_diagnosis *out,
+                              pb_element_data *cured, pb_error *err) {
+  return diagnose(name, data, NULL, options, out, cured, err);
+}
+
 pb_status pb_element_check(const pb_element *element, pb_diagnosis *out, pb_error *err) {
   const pb_element_data view = {.frames = element->frames,
                                 .size = element->size,
                                 .position = element->position,
                                 .k = element->k,
                                 .m = element->m};
-  return pb_element_diagnose(element->file, &view, NULL, out, NULL, err);
+  return diagnose(element->file, &view, element->omega2, NULL, out, NULL, err);
 }
 
 void pb_diagnosis_summary(const pb_diagnosis *d, char *text, size_t size) {

@@ -26,6 +26,9 @@ void pb_measure_rigid(const pb_element_data *e, const double *r, double *transla
 pb_status pb_measure_mass(const char *name, const pb_element_data *e, double *smallest,
                           pb_error *err);
 
+// Hz with the sign of the eigenvalue.
+double pb_signed_hz(double omega2);
+
 // Signed frequencies of K φ = ω² M φ, ascending by eigenvalue, and, with shape (n × n) not NULL,
 // its vectors. PB_ERR_ELEMENT: M is not positive definite.
 pb_status pb_measure_modes(const char *name, size_t n, const double *k, const double *m, double *hz,

@@ -130,6 +130,11 @@ done:
   return st;
 }
 
+double pb_signed_hz(double omega2) {
+  double hz = sqrt(fabs(omega2)) / two_pi;
+  return omega2 < 0 ? -hz : hz;
+}
+
 pb_status pb_measure_modes(const char *name, size_t n, const double *k, const double *m, double *hz,
                            double *shape, pb_error *err) {
   int in = (int)n, itype = 1, info = 0, lwork = 1 + 6 * in + 2 * in * in, liwork = 3 + 5 * in;
@@ -147,7 +152,7 @@ pb_status pb_measure_modes(const char *name, size_t n, const double *k, const do
       st = pb_fail(err, PB_ERR_ELEMENT, name, "M is not positive definite");
     else if (info)
       st = pb_fail(err, PB_ERR_NUMERIC, name, "the modes did not converge");
-    for (size_t i = 0; !st && i < n; i++) hz[i] = (hz[i] < 0 ? -1 : 1) * sqrt(fabs(hz[i])) / two_pi;
+    for (size_t i = 0; !st && i < n; i++) hz[i] = pb_signed_hz(hz[i]);
   }
   if (!shape) free(a);
   free(b);
