@@ -192,15 +192,24 @@ static void limits_judge(void **state) {
     pb_verdict verdict;
     double margin;
   } cases[] = {
-      {0, 1.5e-4, PB_MET, 0.5},    {0, 1e-4, PB_MISSED, 0}, {0, 9.4e-5, PB_MISSED, -0.06},
-      {0, NAN, PB_UNKNOWN, NAN},   {1, 2e6, PB_MET, 0},     {1, 0.5e6, PB_MET, 0},
-      {1, 2.2e6, PB_MISSED, -0.1}, {2, 0.04, PB_MET, 0.2},  {2, 0.06, PB_MISSED, -0.2},
+      {0, 1.5e-4, PB_MET, 0.5},
+      {0, 1e-4, PB_MISSED, 0},
+      {0, 9.4e-5, PB_MISSED, -0.06},
+      {0, NAN, PB_UNKNOWN, NAN},
+      {1, 2e6, PB_MET, 0},
+      {1, 0.5e6, PB_MET, 0},
+      {1, 2.2e6, PB_MISSED, -0.1},
+      {2, 0.04, PB_MET, 0.2},
+      {2, 0.06, PB_MISSED, -0.2},
       {2, 0.009, PB_MISSED, -0.1},
+      {0, INFINITY, PB_MET, INFINITY},
   };
   for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
     assert_int_equal(pb_limit_judge(&l.limit[cases[i].limit], cases[i].value, &margin),
                      cases[i].verdict);
-    if (isnan(cases[i].margin))
+    if (isinf(cases[i].margin))
+      assert_true(margin == INFINITY);
+    else if (isnan(cases[i].margin))
       assert_true(isnan(margin));
     else
       ASSERT_NEAR(margin, cases[i].margin, 1e-9);
