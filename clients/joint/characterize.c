@@ -106,14 +106,14 @@ static size_t values_of(const pb_joint_character *c, double stroke, int quantity
     value[0] = stroke > 0 ? stroke : NAN;
     return 1;
   }
-  value[0] = c->k[first[quantity]];
-  value[1] = c->k[first[quantity] + 1];
-  return quantity == 1 || quantity == 2 ? 2 : 1;
+  const size_t count = quantity == 1 || quantity == 2 ? 2 : 1;
+  for (size_t i = 0; i < count; i++) value[i] = c->k[(size_t)first[quantity] + i];
+  return count;
 }
 
 static void judge(const joint_options *o, joint_result *r) {
   for (int q = 0; q < JOINT_QUANTITIES; q++) {
-    double value[2], margin;
+    double value[2] = {0}, margin;
     const size_t count = values_of(&r->character, o->stroke, q, value);
     r->value[q] = value[0];
     r->margin[q] = NAN;
