@@ -279,13 +279,13 @@ static void the_running_bench(void **state) {
   (void)state;
   e2e_daemon bench = e2e_daemon_start(BENCH, NULL);
   char line[700];
-  snprintf(line, sizeof line, "characterize --live --json --resolution 2 --band 2,400 --domain %u",
+  snprintf(line, sizeof line, "characterize --live --json --resolution 4 --band 4,400 --domain %u",
            bench.domain);
   cJSON *j = tool_json(ACTUATOR, TOOL_NO_DOMAIN, NULL, line, 0);
   ASSERT_RELATIVE(number(j, "stiffness"), 1.7333333e6, 1e-4);
   ASSERT_NEAR(number(j, "loaded_resonance"), 93.183, 2e-3);
   cJSON_Delete(j);
-  snprintf(line, sizeof line, "fit --live --json --resolution 2 --band 2,400 --domain %u",
+  snprintf(line, sizeof line, "fit --live --json --resolution 4 --band 4,400 --domain %u",
            bench.domain);
   j = tool_json(ACTUATOR, TOOL_NO_DOMAIN, NULL, line, 0);
   const cJSON *p = tool_member(j, "parameters");
@@ -296,7 +296,7 @@ static void the_running_bench(void **state) {
   cJSON_Delete(j);
   // The boundary switched on the running plant, and put back.
   snprintf(line, sizeof line,
-           "boundary --live --coupling 0.6 --resistance 300 --json --resolution 2 --band 2,400 "
+           "boundary --live --coupling 0.6 --resistance 300 --json --resolution 4 --band 4,400 "
            "--domain %u",
            bench.domain);
   j = tool_json(ACTUATOR, TOOL_NO_DOMAIN, NULL, line, 0);
@@ -317,7 +317,7 @@ static void a_measured_response(void **state) {
   (void)state;
   e2e_daemon bench = e2e_daemon_start(BENCH, NULL);
   char line[700];
-  snprintf(line, sizeof line, "--input Va --output Vs,y --band 2,400 --resolution 2 -o %s", folder);
+  snprintf(line, sizeof line, "--input Va --output Vs,y --band 4,400 --resolution 4 -o %s", folder);
   tool_result r = tool_run("plantbus-identify", bench.domain, NULL, line);
   assert_int_equal(r.code, 0);
   tool_free(&r);
