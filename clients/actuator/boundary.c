@@ -30,17 +30,6 @@ static const struct argp_option option_table[] = {
     {0},
 };
 
-static void parse_range(struct argp_state *state, const char *text, boundary_options *o) {
-  double *value = NULL;
-  size_t count = 0;
-  pb_option_double_list(state, "--range", text, &value, &count);
-  if (count == 2 && value[0] > 0 && value[1] > value[0])
-    o->f1 = value[0], o->f2 = value[1];
-  else
-    argp_error(state, "--range: '%s' is not two frequencies 0 < F1 < F2", text);
-  free(value);
-}
-
 static int ascending(const void *a, const void *b) {
   const double x = *(const double *)a, y = *(const double *)b;
   return (x > y) - (x < y);
@@ -76,7 +65,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     parse_resistance(state, text, o);
     return 0;
   case KEY_BAND:
-    parse_range(state, text, o);
+    source_option_range(state, "--range", text, &o->f1, &o->f2);
     return 0;
   case ARGP_KEY_ARG:
     source_take_file(&o->source, text, state);

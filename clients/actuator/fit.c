@@ -48,18 +48,6 @@ static const struct argp_option option_table[] = {
     {0},
 };
 
-static void parse_band(struct argp_state *state, const char *flag, const char *text, double *f1,
-                       double *f2) {
-  double *value = NULL;
-  size_t count = 0;
-  pb_option_double_list(state, flag, text, &value, &count);
-  if (count == 2 && value[0] > 0 && value[1] > value[0])
-    *f1 = value[0], *f2 = value[1];
-  else
-    argp_error(state, "%s: '%s' is not two frequencies 0 < F1 < F2", flag, text);
-  free(value);
-}
-
 static void check_end(const fit_options *o, struct argp_state *state) {
   const int given = (o->source.file != NULL) + (o->frf != NULL) + o->live.live;
   if (given != 1) argp_error(state, "tune to one of: a FILE, --frf FILE, --live");
@@ -113,10 +101,10 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     o->ratio = pb_option_double(state, "--ratio", text, 1e-6, 1e6);
     return 0;
   case KEY_BAND:
-    parse_band(state, "--range", text, &o->f1, &o->f2);
+    source_option_range(state, "--range", text, &o->f1, &o->f2);
     return 0;
   case KEY_REFINE:
-    parse_band(state, "--refine", text, &o->refine1, &o->refine2);
+    source_option_range(state, "--refine", text, &o->refine1, &o->refine2);
     return 0;
   case KEY_FREE:
     o->free_ratio = true;

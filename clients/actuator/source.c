@@ -43,15 +43,27 @@ static const struct argp_option source_table[] = {
     {0},
 };
 
-static void parse_pair(struct argp_state *state, const char *flag, const char *text,
-                       size_t out[2]) {
+void source_option_range(const struct argp_state *state, const char *flag, const char *text,
+                         double *f1, double *f2) {
+  double *value = NULL;
+  size_t count = 0;
+  pb_option_double_list(state, flag, text, &value, &count);
+  if (count == 2 && value[0] > 0 && value[1] > value[0])
+    *f1 = value[0], *f2 = value[1];
+  else
+    argp_error(state, "%s: '%s' is not two frequencies 0 < F1 < F2", flag, text);
+  free(value);
+}
+
+void source_option_frames(const struct argp_state *state, const char *flag, const char *text,
+                          size_t frames[2]) {
   double *value = NULL;
   size_t count = 0;
   pb_option_double_list(state, flag, text, &value, &count);
   bool ok = count == 2 && value[0] != value[1];
   for (size_t i = 0; i < count && ok; i++) {
-    out[i] = value[i] >= 1 && value[i] <= 1e6 ? (size_t)value[i] : 0;
-    ok = out[i] > 0 && (double)out[i] == value[i];
+    frames[i] = value[i] >= 1 && value[i] <= 1e6 ? (size_t)value[i] : 0;
+    ok = frames[i] > 0 && (double)frames[i] == value[i];
   }
   if (!ok) argp_error(state, "%s: '%s' is not two different frames, counted from 1", flag, text);
   free(value);
@@ -82,13 +94,13 @@ static error_t source_parse(int key, char *text, struct argp_state *state) {
   }
   switch (key) {
   case KEY_ENDS:
-    parse_pair(state, "--ends", text, l->ends);
+    source_option_frames(state, "--ends", text, l->ends);
     break;
   case KEY_ACTUATOR:
-    parse_pair(state, "--actuator-frames", text, l->actuator);
+    source_option_frames(state, "--actuator-frames", text, l->actuator);
     break;
   case KEY_SENSOR:
-    parse_pair(state, "--sensor-frames", text, l->sensor);
+    source_option_frames(state, "--sensor-frames", text, l->sensor);
     break;
   case KEY_AXIS:
     parse_axis(state, text, l->axis);

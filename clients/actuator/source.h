@@ -31,6 +31,13 @@ bool source_is_element_file(const char *path);
 // The text of a plant file and the directory that its paths are relative to; the caller's (free).
 pb_status source_read_plant(const char *path, char **text, char **directory, pb_error *err);
 
+// The value of a flag F1,F2 with 0 < F1 < F2 (Hz), and of a flag with two different frames, counted
+// from 1. Both end the program through argp where it is neither.
+void source_option_range(const struct argp_state *state, const char *flag, const char *text,
+                         double *f1, double *f2);
+void source_option_frames(const struct argp_state *state, const char *flag, const char *text,
+                          size_t frames[2]);
+
 // --json, --output-dir, --plot.
 typedef struct result_options {
   bool json, plot;

@@ -33,30 +33,6 @@ static const struct argp_option option_table[] = {
     {0},
 };
 
-static void parse_nodes(struct argp_state *state, const char *text, joint_options *o) {
-  double *value = NULL;
-  size_t count = 0;
-  pb_option_double_list(state, "--nodes", text, &value, &count);
-  bool ok = count == 2 && value[0] != value[1];
-  for (size_t i = 0; i < count && ok; i++) {
-    ok = value[i] >= 1 && value[i] <= 1e6 && value[i] == floor(value[i]);
-    if (ok) o->nodes[i] = (size_t)value[i];
-  }
-  if (!ok) argp_error(state, "--nodes: '%s' is not two different frames, counted from 1", text);
-  free(value);
-}
-
-static void parse_range(struct argp_state *state, const char *text, joint_options *o) {
-  double *value = NULL;
-  size_t count = 0;
-  pb_option_double_list(state, "--range", text, &value, &count);
-  if (count == 2 && value[0] > 0 && value[1] > value[0])
-    o->f1 = value[0], o->f2 = value[1];
-  else
-    argp_error(state, "--range: '%s' is not two frequencies 0 < F1 < F2", text);
-  free(value);
-}
-
 static error_t parse(int key, char *text, struct argp_state *state) {
   joint_options *o = state->input;
   switch (key) {
@@ -67,7 +43,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     o->model = text;
     return 0;
   case KEY_NODES:
-    parse_nodes(state, text, o);
+    source_option_frames(state, "--nodes", text, o->nodes);
     o->element_option = true;
     return 0;
   case KEY_DAMPING:
@@ -84,7 +60,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     o->check = true;
     return 0;
   case KEY_BAND:
-    parse_range(state, text, o);
+    source_option_range(state, "--range", text, &o->f1, &o->f2);
     return 0;
   case ARGP_KEY_ARG:
     if (o->file) argp_error(state, "unexpected argument '%s'", text);
@@ -130,14 +106,14 @@ static size_t values_of(const pb_joint_character *c, double stroke, int quantity
     value[0] = stroke > 0 ? stroke : NAN;
     return 1;
   }
-  value[0] = c->k[first[quantity]];
-  value[1] = c->k[first[quantity] + 1];
-  return quantity == 1 || quantity == 2 ? 2 : 1;
+  const size_t count = quantity == 1 || quantity == 2 ? 2 : 1;
+  for (size_t i = 0; i < count; i++) value[i] = c->k[(size_t)first[quantity] + i];
+  return count;
 }
 
 static void judge(const joint_options *o, joint_result *r) {
   for (int q = 0; q < JOINT_QUANTITIES; q++) {
-    double value[2], margin;
+    double value[2] = {0}, margin;
     const size_t count = values_of(&r->character, o->stroke, q, value);
     r->value[q] = value[0];
     r->margin[q] = NAN;

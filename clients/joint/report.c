@@ -17,6 +17,8 @@ static const char *verdict_text(const joint_result *r, int q) {
 static void margin_text(const joint_result *r, int q, char *text, size_t size) {
   if (!r->limit[q] || isnan(r->margin[q]))
     snprintf(text, size, "–");
+  else if (isinf(r->margin[q]))
+    snprintf(text, size, "%s", r->margin[q] > 0 ? "locked" : "miss: locked");
   else if (r->verdict[q] == PB_MISSED)
     snprintf(text, size, "miss by %.2g %%", fabs(100 * r->margin[q]));
   else

@@ -17,20 +17,21 @@ static void continuous(const pb_apa_2dof *p, double complex s, double complex h[
   h[PB_APA_VS] = p->g_a * p->g_s * (ke - a) / det;
 }
 
-// States z, w, ż, ẇ.
+// States z, e = z − w, ż, ė: V_s is a state, not a small difference of two.
 static void fill_states(const pb_apa_2dof *p, double a[16], double b[4]) {
+  const double up = 1 / p->moving, in = 1 / p->inner;
   memset(a, 0, 16 * sizeof *a);
   memset(b, 0, 4 * sizeof *b);
   a[0 + 4 * 2] = a[1 + 4 * 3] = 1;
-  a[2 + 4 * 0] = -(p->k_1 + p->k_e) / p->moving;
-  a[2 + 4 * 1] = p->k_e / p->moving;
-  a[2 + 4 * 2] = -(p->c_1 + p->c_e) / p->moving;
-  a[2 + 4 * 3] = p->c_e / p->moving;
-  a[3 + 4 * 0] = p->k_e / p->inner;
-  a[3 + 4 * 1] = -(p->k_a + p->k_e) / p->inner;
-  a[3 + 4 * 2] = p->c_e / p->inner;
-  a[3 + 4 * 3] = -(p->c_a + p->c_e) / p->inner;
-  b[3] = p->g_a / p->inner;
+  a[2 + 4 * 0] = -p->k_1 * up;
+  a[2 + 4 * 1] = -p->k_e * up;
+  a[2 + 4 * 2] = -p->c_1 * up;
+  a[2 + 4 * 3] = -p->c_e * up;
+  a[3 + 4 * 0] = a[2 + 4 * 0] + p->k_a * in;
+  a[3 + 4 * 1] = a[2 + 4 * 1] - (p->k_a + p->k_e) * in;
+  a[3 + 4 * 2] = a[2 + 4 * 2] + p->c_a * in;
+  a[3 + 4 * 3] = a[2 + 4 * 3] - (p->c_a + p->c_e) * in;
+  b[3] = -p->g_a * in;
 }
 
 // (λ − A_d) x = b by elimination with pivots.
@@ -79,7 +80,7 @@ static void sampled(const pb_apa_2dof *p, const double *ad, const double *bd, do
   double complex x[4];
   solve4(ad, z, bd, x);
   h[PB_APA_Y] = x[0];
-  h[PB_APA_VS] = p->g_s * (x[0] - x[1]);
+  h[PB_APA_VS] = p->g_s * x[1];
 }
 
 pb_status pb_apa_2dof_response(const pb_apa_2dof *p, double sample_rate, const double *hz,
@@ -111,7 +112,7 @@ pb_status pb_apa_2dof_sampled_zero(const pb_apa_2dof *p, double sample_rate, dou
   for (int k = 0; k < 50; k++) {
     sampled(p, ad, bd, cexp(s1 / sample_rate), h);
     const double complex h1 = h[PB_APA_VS], step = h1 * (s1 - s0) / (h1 - h0);
-    if (h1 == 0 || cabs(s1 - s0) < 1e-12 * cabs(s1)) {
+    if (h1 == 0 || cabs(s1 - s0) < 1e-10 * cabs(s1)) {
       *zero = s1;
       return PB_OK;
     }

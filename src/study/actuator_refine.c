@@ -4,7 +4,7 @@
 // solves
 //   (JᵀJ + λ diag JᵀJ) Δ = −Jᵀr
 // with λ falling where it helps and rising where it does not (D. Marquardt, SIAM J. Appl. Math. 11,
-// 1963). J by differences.
+// 1963). J by central differences.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,7 +13,8 @@
 #include "study/actuator_fit.h"
 
 enum { SHARED = 6, MOST = 8, ITERATIONS = 100 };
-static const double difference_step = 1e-6;
+// A sampled response is good to 1e-8 near its zero: differences over less than this drown in it.
+static const double difference_step = 1e-4;
 
 typedef struct problem {
   const pb_apa_data *data;
@@ -126,12 +127,15 @@ static pb_status residuals(problem *p, const double *theta, double *r, double *s
 static pb_status jacobian(problem *p, const double *theta, pb_error *err) {
   pb_status st = PB_OK;
   for (size_t i = 0; i < p->parameters && !st; i++) {
-    double shifted[MOST], sum;
-    memcpy(shifted, theta, sizeof shifted);
-    shifted[i] += difference_step;
-    st = residuals(p, shifted, p->moved, &sum, err);
-    for (size_t k = 0; k < p->residuals; k++)
-      p->j[k + i * p->residuals] = (p->moved[k] - p->r[k]) / difference_step;
+    double *column = p->j + i * p->residuals, above[MOST], below[MOST], sum;
+    memcpy(above, theta, sizeof above);
+    memcpy(below, theta, sizeof below);
+    above[i] += difference_step;
+    below[i] -= difference_step;
+    st = residuals(p, above, column, &sum, err);
+    if (!st) st = residuals(p, below, p->moved, &sum, err);
+    for (size_t k = 0; k < p->residuals && !st; k++)
+      column[k] = (column[k] - p->moved[k]) / (2 * difference_step);
   }
   return st;
 }

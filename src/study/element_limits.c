@@ -112,7 +112,10 @@ pb_verdict pb_limit_judge(const pb_limit *l, double value, double *margin) {
   if (isfinite(l->low)) low = (value - l->low) / fabs(l->low);
   if (isfinite(l->high)) high = (l->high - value) / fabs(l->high);
   *margin = fmin(low, high);
-  const bool met = l->about ? *margin >= -1e-12 : value > l->low && value < l->high;
+  // A locked direction is infinitely stiff: above every limit.
+  const bool met =
+      l->about ? *margin >= -1e-12
+               : (!isfinite(l->low) || value > l->low) && (!isfinite(l->high) || value < l->high);
   return met ? PB_MET : PB_MISSED;
 }
 
