@@ -87,7 +87,8 @@ static pb_status send_value(const live *l, pb_session *session, const char *valu
   pb_status status =
       patch ? pb_json_parse(text, strlen(text), &now, err) : pb_fail_memory(err, "request");
   if (!status) status = pb_variation_apply(l->original, &v, &target, err);
-  if (!status) status = add_difference(now, target, "models", patch, err);
+  if (!status && l->options->models.count > 0)
+    status = add_difference(now, target, "models", patch, err);
   if (!status) status = add_difference(now, target, "template", patch, err);
   if (!status) status = request_change(l, session, "configure", body, err);
   cJSON_Delete(body);
