@@ -157,8 +157,9 @@ static pb_status vary_stiffness(const cJSON *file, cJSON *template, pb_study_kin
                        "in its place");
     if (!status && has_direction(type_of(joint), kind)) {
       status = set_stiffness(joint, where, kind, value, err);
-      if (!status) status = put(template, joint_key[side], joint, err);
-      joint = NULL;
+      cJSON *set = status ? NULL : joint;
+      if (set) joint = NULL;
+      if (set) status = put(template, joint_key[side], set, err);
       changed++;
     }
     cJSON_Delete(joint);
