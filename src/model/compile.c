@@ -15,6 +15,7 @@
 #include "model/block.h"
 #include "model/build.h"
 #include "model/modes.h"
+#include "model/relax.h"
 
 static const double two_pi = 6.283185307179586476925286766559;
 
@@ -259,7 +260,10 @@ pb_status pb_model_compile(const pb_system *s, pb_warnings *warnings, pb_model *
   if (!st) st = pb_model_builder_open(&builder, 2 * s->n, s->nu, s->ny, s->n, err);
   if (!st) st = fill_header(s, &modes, builder.model, err);
   if (!st) st = build_groups(&modes, &builder, err);
-  if (!st) st = pb_model_builder_close(&builder, s->plant->max_frequency, out, err);
+  if (!st && s->relaxations == 0)
+    st = pb_model_builder_close(&builder, s->plant->max_frequency, out, err);
+  else if (!st)
+    st = pb_model_relax(s, &builder, out, err);
   pb_model_builder_discard(&builder);
   pb_modes_clear(&modes);
   return st;

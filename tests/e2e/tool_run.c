@@ -46,10 +46,13 @@ tool_process tool_start(const char *name, uint32_t domain, const char *environme
   snprintf(copy, sizeof copy, "%s", line);
   snprintf(file, sizeof file, "%s/%s", PB_BIN, name);
   snprintf(number, sizeof number, "%u", domain);
+  size_t fixed = 1;
   argv[0] = file;
-  argv[1] = "--domain";
-  argv[2] = number;
-  argv[3 + words(copy, argv + 3, WORDS)] = NULL;
+  if (domain != TOOL_NO_DOMAIN) {
+    argv[fixed++] = "--domain";
+    argv[fixed++] = number;
+  }
+  argv[fixed + words(copy, argv + fixed, WORDS)] = NULL;
   tool_process t = {.out = memfd_create("out", MFD_CLOEXEC),
                     .err = memfd_create("err", MFD_CLOEXEC)};
   assert_true(t.out >= 0 && t.err >= 0);

@@ -7,6 +7,9 @@
 #include <stdint.h>
 #include <sys/types.h>
 
+// As domain: a tool that knows of none.
+#define TOOL_NO_DOMAIN UINT32_MAX
+
 // A tool that runs; standard output and error go into memory files.
 typedef struct tool_process {
   pid_t pid;
