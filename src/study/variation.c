@@ -139,33 +139,36 @@ static pb_status set_stiffness(cJSON *joint, const char *where, pb_study_kind ki
   return put_number(joint, kind == PB_STUDY_BENDING ? "k_f" : "k_t", value, err);
 }
 
-// Sets a stiffness in both joints, or in the one that has the direction.
+// Sets a stiffness in one joint where it has the direction; *changed tells.
+static pb_status vary_joint(const cJSON *file, cJSON *template, const char *key, pb_study_kind kind,
+                            double value, bool *changed, pb_error *err) {
+  char where[64];
+  cJSON *joint = NULL;
+  pb_json_pointer(where, sizeof where, "/template", key);
+  pb_status status = pb_template_part(file, key, &joint, err);
+  if (status) return status;
+  const char *type = type_of(joint);
+  if (!strcmp(type, "super_element"))
+    status =
+        pb_fail(err, PB_ERR_STATE, where,
+                "an element's stiffness cannot be set; joint-model puts a simpler joint in its "
+                "place");
+  *changed = !status && has_direction(type, kind);
+  if (*changed) status = set_stiffness(joint, where, kind, value, err);
+  if (*changed && !status) return put(template, key, joint, err);
+  cJSON_Delete(joint);
+  return status;
+}
+
+// Both joints, or the one that has the direction.
 static pb_status vary_stiffness(const cJSON *file, cJSON *template, pb_study_kind kind,
                                 double value, pb_error *err) {
-  size_t changed = 0;
+  bool changed[2] = {false, false};
   pb_status status = PB_OK;
-  char where[64] = "";
-  for (int side = 0; side < 2 && !status; side++) {
-    cJSON *joint = NULL;
-    pb_json_pointer(where, sizeof where, "/template", joint_key[side]);
-    status = pb_template_part(file, joint_key[side], &joint, err);
-    if (status) return status;
-    bool element = !strcmp(type_of(joint), "super_element");
-    if (element)
-      status = pb_fail(err, PB_ERR_STATE, where,
-                       "an element's stiffness cannot be set; joint-model puts a simpler joint "
-                       "in its place");
-    if (!status && has_direction(type_of(joint), kind)) {
-      status = set_stiffness(joint, where, kind, value, err);
-      cJSON *set = status ? NULL : joint;
-      if (set) joint = NULL;
-      if (set) status = put(template, joint_key[side], set, err);
-      changed++;
-    }
-    cJSON_Delete(joint);
-  }
-  if (status || changed) return status;
-  return pb_fail(err, PB_ERR_STATE, where, "neither joint of the struts has a stiffness %s",
+  for (int side = 0; side < 2 && !status; side++)
+    status = vary_joint(file, template, joint_key[side], kind, value, &changed[side], err);
+  if (status || changed[0] || changed[1]) return status;
+  return pb_fail(err, PB_ERR_STATE, "/template", "neither joint of the struts has a stiffness %s",
                  pb_study_kind_of(kind)->quantity);
 }
 
