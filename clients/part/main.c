@@ -2,6 +2,8 @@
 #include "part.h"
 
 static const pb_command commands[] = {
+    {"build", part_build, "from dimensions to an element"},
+    {"reduce", part_reduce, "full K and M from outside to an element"},
     {0},
 };
 

@@ -4,4 +4,7 @@
 
 #include "commands.h"
 
+pb_command_function part_build;
+pb_command_function part_reduce;
+
 #endif
