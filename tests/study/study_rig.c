@@ -8,7 +8,7 @@ cJSON *rig_file(const char *path) {
 }
 
 cJSON *rig_vary(const cJSON *file, pb_study_kind kind, const char *value) {
-  const pb_variation v = {kind, value, {NAN, NAN, NAN, NAN}};
+  const pb_variation v = {kind, value, {NAN, NAN, NAN, NAN}, PB_CONFIG "/plants"};
   cJSON *out = NULL;
   REQUIRE(pb_variation_apply(file, &v, &out, &err));
   return out;

@@ -117,7 +117,7 @@ static void results_come_in_the_order_of_the_values(void **state) {
     ASSERT_NEAR(cJSON_GetObjectItem(v, "value")->valuedouble, expected[k], 0);
     ASSERT_NEAR(cJSON_GetObjectItem(v, "states")->valuedouble, 12, 0);
     const cJSON *k_r = cJSON_GetObjectItem(cJSON_GetObjectItem(v, "struts"), "k_r");
-    ASSERT_NEAR(k_r->valuedouble, expected[k], 0);
+    ASSERT_NEAR(k_r->valuedouble, expected[k], 1e-9);
     assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(v, "attainable_damping")), 6);
   }
   assert_true(cJSON_IsNull(

@@ -101,7 +101,7 @@ static void one_dof_struts_have_the_static_stiffness(void **state) {
 static void joint_models_take_the_plants_stiffnesses(void **state) {
   (void)state;
   cJSON *file = rig_file(HEXAPOD), *out = NULL;
-  const pb_variation v = {PB_STUDY_JOINT_MODEL, "bushing", {NAN, 100, NAN, 12.7e6}};
+  const pb_variation v = {PB_STUDY_JOINT_MODEL, "bushing", {NAN, 100, NAN, 12.7e6}, NULL};
   REQUIRE(pb_variation_apply(file, &v, &out, &err));
   for (int side = 0; side < 2; side++) {
     const cJSON *joint = part(out, joints[side]);
@@ -128,7 +128,7 @@ static void joint_models_take_the_plants_stiffnesses(void **state) {
 static void check_refused(const char *path, pb_study_kind kind, const char *value, pb_status code,
                           const char *words) {
   cJSON *file = rig_file(path), *out = file;
-  const pb_variation v = {kind, value, {NAN, NAN, NAN, NAN}};
+  const pb_variation v = {kind, value, {NAN, NAN, NAN, NAN}, PB_CONFIG "/plants"};
   pb_error err = {0};
   pb_status status = pb_variation_apply(file, &v, &out, &err);
   if (status != code || !strstr(err.message, words))
@@ -158,12 +158,12 @@ static void elements_are_not_set(void **state) {
   cJSON_AddStringToObject(element, "type", "super_element");
   cJSON *template = cJSON_GetObjectItem(file, "template");
   cJSON_ReplaceItemInObject(template, "top_joint", element);
-  const pb_variation v = {PB_STUDY_AXIAL, "1e8", {NAN, NAN, NAN, NAN}};
+  const pb_variation v = {PB_STUDY_AXIAL, "1e8", {NAN, NAN, NAN, NAN}, PB_CONFIG "/plants"};
   pb_error err = {0};
   assert_int_equal(pb_variation_apply(file, &v, &out, &err), PB_ERR_STATE);
   assert_string_equal(err.where, "/template/top_joint");
   cJSON_ReplaceItemInObject(element, "type", cJSON_CreateString("bushing"));
-  const pb_variation locked = {PB_STUDY_AXIAL, "inf", {NAN, NAN, NAN, NAN}};
+  const pb_variation locked = {PB_STUDY_AXIAL, "inf", {NAN, NAN, NAN, NAN}, PB_CONFIG "/plants"};
   assert_int_equal(pb_variation_apply(file, &locked, &out, &err), PB_ERR_STATE);
   assert_non_null(strstr(err.message, "cannot be locked"));
   cJSON_Delete(file);
