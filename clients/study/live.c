@@ -80,14 +80,15 @@ static pb_status add_difference(const cJSON *document, const cJSON *target, cons
 
 static pb_status send_value(const live *l, pb_session *session, const char *value, pb_error *err) {
   const char *text = pb_session_description(session)->plant_text;
-  const pb_variation v = {l->options->kind, value, l->options->stiffness};
+  const pb_variation v = {l->options->kind, value, l->options->stiffness, NULL};
   cJSON *now = NULL, *target = NULL, *body = cJSON_CreateObject();
   cJSON *patch = cJSON_AddObjectToObject(body, "patch");
   cJSON_AddStringToObject(body, "name", "plantbus-study");
   pb_status status =
       patch ? pb_json_parse(text, strlen(text), &now, err) : pb_fail_memory(err, "request");
   if (!status) status = pb_variation_apply(l->original, &v, &target, err);
-  if (!status) status = add_difference(now, target, "models", patch, err);
+  if (!status && l->options->models.count > 0)
+    status = add_difference(now, target, "models", patch, err);
   if (!status) status = add_difference(now, target, "template", patch, err);
   if (!status) status = request_change(l, session, "configure", body, err);
   cJSON_Delete(body);
@@ -274,7 +275,7 @@ static pb_status begin(live *l, pb_error *err) {
     status = pb_fail_memory(err, "values");
   const pb_name_list *list = asked ? &l->options->values : &wanted;
   for (size_t k = 0; k < list->count && !status; k++) {
-    const pb_variation v = {l->options->kind, list->name[k], l->options->stiffness};
+    const pb_variation v = {l->options->kind, list->name[k], l->options->stiffness, NULL};
     cJSON *varied = NULL;
     status = pb_variation_apply(l->original, &v, &varied, err);
     cJSON_Delete(varied);

@@ -42,7 +42,7 @@ pb_status study_add_model(cJSON *file, const char *text, pb_error *err) {
 }
 
 static pb_variation variation_of(const study *s, size_t index) {
-  return (pb_variation){s->options->kind, s->label[index], s->options->stiffness};
+  return (pb_variation){s->options->kind, s->label[index], s->options->stiffness, s->directory};
 }
 
 // Keeps a value that the plant can have; one that was not asked for may be left out.

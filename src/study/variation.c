@@ -7,6 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/text.h"
+#include "study/template_part.h"
+
 static const pb_study_kind_facts kinds[PB_STUDY_KINDS] = {
     [PB_STUDY_BENDING] = {"bending", "k_f", "Nm/rad", "0,50,100,500"},
     [PB_STUDY_TORSION] = {"torsion", "k_t", "Nm/rad", "0,100,500,1000"},
@@ -41,56 +44,7 @@ pb_status pb_variation_number(const pb_variation *v, double *out, pb_error *err)
   return PB_OK;
 }
 
-// ---- parts of the template ----------------------------------------------------------------------
-
-static pb_status find_template(const cJSON *file, const cJSON **out, pb_error *err) {
-  *out = pb_json_member(file, "template");
-  if (cJSON_IsObject(*out)) return PB_OK;
-  return pb_fail(err, PB_ERR_STATE, "/template", "the plant has no template nano_hexapod to vary");
-}
-
-static pb_status find_model(const cJSON *file, const char *name, const cJSON **out, pb_error *err) {
-  const cJSON *models = pb_json_member(file, "models");
-  *out = models ? pb_json_member(models, name) : NULL;
-  if (cJSON_IsObject(*out)) return PB_OK;
-  return pb_fail(err, PB_ERR_REFERENCE, "/models", "there is no model \"%s\"", name);
-}
-
-// A model's name, an object, or an object that names a model, as one flat object.
-static pb_status flatten(const cJSON *file, const cJSON *value, const char *where, cJSON **out,
-                         pb_error *err) {
-  const cJSON *model = NULL, *name = cJSON_IsString(value) ? value : pb_json_member(value, "model");
-  pb_status status = PB_OK;
-  *out = NULL;
-  if (cJSON_IsString(name)) status = find_model(file, name->valuestring, &model, err);
-  if (status) return status;
-  if (!cJSON_IsString(value) && !cJSON_IsObject(value))
-    return pb_fail(err, PB_ERR_STATE, where, "expected the name of a model or an object");
-  cJSON *flat = cJSON_IsString(value) ? cJSON_Duplicate(model, 1)
-                : model               ? pb_json_merge(model, value)
-                                      : cJSON_Duplicate(value, 1);
-  if (!flat) return pb_fail_memory(err, where);
-  cJSON_DeleteItemFromObjectCaseSensitive(flat, "model");
-  *out = flat;
-  return PB_OK;
-}
-
-pb_status pb_template_part(const cJSON *file, const char *key, cJSON **out, pb_error *err) {
-  const cJSON *template;
-  char where[256];
-  *out = NULL;
-  pb_status status = find_template(file, &template, err);
-  if (status) return status;
-  pb_json_pointer(where, sizeof where, "/template", key);
-  const cJSON *value = pb_json_member(template, key);
-  if (!value) return pb_fail(err, PB_ERR_STATE, where, "missing");
-  return flatten(file, value, where, out, err);
-}
-
-static const char *type_of(const cJSON *part) {
-  const cJSON *type = pb_json_member(part, "type");
-  return cJSON_IsString(type) ? type->valuestring : "";
-}
+// ---- JSON ---------------------------------------------------------------------------------------
 
 // Sets or replaces a member; takes the value over.
 static pb_status put(cJSON *object, const char *key, cJSON *value, pb_error *err) {
@@ -123,7 +77,7 @@ static const char *axial_type(const char *type, bool free_axis) {
 }
 
 static pb_status set_axial(cJSON *joint, const char *where, double value, pb_error *err) {
-  const char *type = axial_type(type_of(joint), isfinite(value));
+  const char *type = axial_type(pb_part_type(joint), isfinite(value));
   if (!type)
     return pb_fail(err, PB_ERR_STATE, where, "a bushing's axial direction cannot be locked");
   pb_status status = put(joint, "type", cJSON_CreateString(type), err);
@@ -139,32 +93,36 @@ static pb_status set_stiffness(cJSON *joint, const char *where, pb_study_kind ki
   return put_number(joint, kind == PB_STUDY_BENDING ? "k_f" : "k_t", value, err);
 }
 
-// Sets a stiffness in both joints, or in the one that has the direction.
+// Sets a stiffness in one joint where it has the direction; *changed tells.
+static pb_status vary_joint(const cJSON *file, cJSON *template, const char *key, pb_study_kind kind,
+                            double value, bool *changed, pb_error *err) {
+  char where[64];
+  cJSON *joint = NULL;
+  pb_json_pointer(where, sizeof where, "/template", key);
+  pb_status status = pb_template_part(file, key, &joint, err);
+  if (status) return status;
+  const char *type = pb_part_type(joint);
+  if (!strcmp(type, "super_element"))
+    status =
+        pb_fail(err, PB_ERR_STATE, where,
+                "an element's stiffness cannot be set; joint-model puts a simpler joint in its "
+                "place");
+  *changed = !status && has_direction(type, kind);
+  if (*changed) status = set_stiffness(joint, where, kind, value, err);
+  if (*changed && !status) return put(template, key, joint, err);
+  cJSON_Delete(joint);
+  return status;
+}
+
+// Both joints, or the one that has the direction.
 static pb_status vary_stiffness(const cJSON *file, cJSON *template, pb_study_kind kind,
                                 double value, pb_error *err) {
-  size_t changed = 0;
+  bool changed[2] = {false, false};
   pb_status status = PB_OK;
-  char where[64] = "";
-  for (int side = 0; side < 2 && !status; side++) {
-    cJSON *joint = NULL;
-    pb_json_pointer(where, sizeof where, "/template", joint_key[side]);
-    status = pb_template_part(file, joint_key[side], &joint, err);
-    if (status) return status;
-    bool element = !strcmp(type_of(joint), "super_element");
-    if (element)
-      status = pb_fail(err, PB_ERR_STATE, where,
-                       "an element's stiffness cannot be set; joint-model puts a simpler joint "
-                       "in its place");
-    if (!status && has_direction(type_of(joint), kind)) {
-      status = set_stiffness(joint, where, kind, value, err);
-      if (!status) status = put(template, joint_key[side], joint, err);
-      joint = NULL;
-      changed++;
-    }
-    cJSON_Delete(joint);
-  }
-  if (status || changed) return status;
-  return pb_fail(err, PB_ERR_STATE, where, "neither joint of the struts has a stiffness %s",
+  for (int side = 0; side < 2 && !status; side++)
+    status = vary_joint(file, template, joint_key[side], kind, value, &changed[side], err);
+  if (status || changed[0] || changed[1]) return status;
+  return pb_fail(err, PB_ERR_STATE, "/template", "neither joint of the struts has a stiffness %s",
                  pb_study_kind_of(kind)->quantity);
 }
 
@@ -181,16 +139,44 @@ static const struct joint_form {
     {"bushing", {"bushing", "bushing"}, true, true, true},
 };
 
+// The entry of a joint's six stiffnesses that a key stands for, of the stiffer of two axes.
+static double stiffness_of(const double k[6], const char *key) {
+  switch (key[2]) {
+  case 'f':
+    return fmax(k[3], k[4]);
+  case 't':
+    return k[5];
+  case 'a':
+    return k[2];
+  default:
+    return fmax(k[0], k[1]);
+  }
+}
+
+// The stiffness of the file's joint: its key, or what its element's matrices say. NaN: neither.
+static pb_status own_stiffness(const cJSON *file, const char *joint, const char *directory,
+                               const char *key, double *out, pb_error *err) {
+  cJSON *part;
+  double k[6];
+  pb_status status = pb_template_part(file, joint, &part, err);
+  if (status) return status;
+  const cJSON *item = pb_json_member(part, key);
+  bool element = !strcmp(pb_part_type(part), "super_element");
+  *out = cJSON_IsNumber(item) ? item->valuedouble : NAN;
+  cJSON_Delete(part);
+  if (!element) return PB_OK;
+  status = pb_template_joint(file, joint, directory, k, err);
+  if (!status) *out = stiffness_of(k, key);
+  return status;
+}
+
 // A stiffness as told, else as the file's joint has it, else as the other joint of the struts has.
-static pb_status take_stiffness(const cJSON *file, int side, const char *key, double given,
-                                cJSON *joint, pb_error *err) {
+static pb_status take_stiffness(const cJSON *file, const pb_variation *v, int side, const char *key,
+                                double given, cJSON *joint, pb_error *err) {
   for (int turn = 0; turn < 2 && isnan(given); turn++) {
-    cJSON *own;
-    pb_status status = pb_template_part(file, joint_key[turn ? 1 - side : side], &own, err);
+    pb_status status =
+        own_stiffness(file, joint_key[turn ? 1 - side : side], v->directory, key, &given, err);
     if (status) return status;
-    const cJSON *item = pb_json_member(own, key);
-    if (cJSON_IsNumber(item)) given = item->valuedouble;
-    cJSON_Delete(own);
   }
   if (isfinite(given)) return put_number(joint, key, given, err);
   return pb_fail(err, PB_ERR_ARGUMENT, joint_key[side],
@@ -199,18 +185,19 @@ static pb_status take_stiffness(const cJSON *file, int side, const char *key, do
 }
 
 static pb_status make_joint(const cJSON *file, const struct joint_form *form, int side,
-                            const pb_joint_stiffness *k, cJSON **out, pb_error *err) {
+                            const pb_variation *v, cJSON **out, pb_error *err) {
+  const pb_joint_stiffness *k = &v->stiffness;
   cJSON *joint = cJSON_CreateObject();
   bool turns = strncmp(form->type[side], "universal", 9) != 0;
   pb_status status = joint ? put(joint, "type", cJSON_CreateString(form->type[side]), err)
                            : pb_fail_memory(err, "joint");
   if (!status && !form->rotations) status = put_number(joint, "k_f", 0, err);
   if (!status && !form->rotations && turns) status = put_number(joint, "k_t", 0, err);
-  if (!status && form->rotations) status = take_stiffness(file, side, "k_f", k->k_f, joint, err);
+  if (!status && form->rotations) status = take_stiffness(file, v, side, "k_f", k->k_f, joint, err);
   if (!status && form->rotations && turns)
-    status = take_stiffness(file, side, "k_t", k->k_t, joint, err);
-  if (!status && form->axial) status = take_stiffness(file, side, "k_a", k->k_a, joint, err);
-  if (!status && form->shear) status = take_stiffness(file, side, "k_s", k->k_s, joint, err);
+    status = take_stiffness(file, v, side, "k_t", k->k_t, joint, err);
+  if (!status && form->axial) status = take_stiffness(file, v, side, "k_a", k->k_a, joint, err);
+  if (!status && form->shear) status = take_stiffness(file, v, side, "k_s", k->k_s, joint, err);
   if (status)
     cJSON_Delete(joint);
   else
@@ -218,17 +205,30 @@ static pb_status make_joint(const cJSON *file, const struct joint_form *form, in
   return status;
 }
 
+// A model of the file for one side, out of "NAME" or "BOTTOM+TOP".
+static pb_status name_joint(const cJSON *file, const char *text, int side, cJSON **out,
+                            pb_error *err) {
+  const cJSON *model;
+  char *copy = pb_text_copy(text), *plus = copy ? strchr(copy, '+') : NULL;
+  if (!copy) return pb_fail_memory(err, text);
+  if (plus) *plus = '\0';
+  const char *name = plus && side > 0 ? plus + 1 : copy;
+  pb_status status = pb_file_model_find(file, name, &model, err);
+  if (!status) *out = cJSON_CreateString(name);
+  free(copy);
+  return status;
+}
+
 static pb_status vary_joint_model(const cJSON *file, cJSON *template, const pb_variation *v,
                                   pb_error *err) {
   const struct joint_form *form = NULL;
-  const cJSON *model = NULL;
+  pb_status status = PB_OK;
   for (size_t i = 0; i < sizeof joint_forms / sizeof *joint_forms; i++)
     if (!strcmp(joint_forms[i].name, v->text)) form = &joint_forms[i];
-  pb_status status = form ? PB_OK : find_model(file, v->text, &model, err);
   for (int side = 0; side < 2 && !status; side++) {
     cJSON *joint = NULL;
-    status = form ? make_joint(file, form, side, &v->stiffness, &joint, err) : PB_OK;
-    if (!form) joint = cJSON_CreateString(v->text);
+    status = form ? make_joint(file, form, side, v, &joint, err)
+                  : name_joint(file, v->text, side, &joint, err);
     if (!status) status = put(template, joint_key[side], joint, err);
   }
   return status;
@@ -241,11 +241,11 @@ static pb_status find_actuator(const cJSON *file, const char *type, cJSON **out,
   const cJSON *models = pb_json_member(file, "models"), *found = NULL;
   size_t count = 0;
   pb_status status = pb_template_part(file, "actuator", out, err);
-  if (status || !strcmp(type_of(*out), type)) return status;
+  if (status || !strcmp(pb_part_type(*out), type)) return status;
   cJSON_Delete(*out);
   *out = NULL;
   for (const cJSON *m = models ? models->child : NULL; m; m = m->next)
-    if (!strcmp(type_of(m), type)) found = m, count++;
+    if (!strcmp(pb_part_type(m), type)) found = m, count++;
   if (count != 1)
     return pb_fail(err, PB_ERR_STATE, "/models", "%s of type %s; name the one that is meant",
                    count ? "there are several models" : "neither the actuator nor a model is",
@@ -280,7 +280,7 @@ static pb_status simplify(const cJSON *apa, cJSON **out, pb_error *err) {
 static pb_status make_1dof(const cJSON *file, cJSON **out, pb_error *err) {
   cJSON *own = NULL;
   pb_status status = pb_template_part(file, "actuator", &own, err);
-  if (!status && !strcmp(type_of(own), "strut_1dof")) {
+  if (!status && !strcmp(pb_part_type(own), "strut_1dof")) {
     *out = own;
     return PB_OK;
   }
@@ -302,7 +302,7 @@ static pb_status vary_actuator_model(const cJSON *file, cJSON *template, const c
   else if (!strcmp(name, "2dof"))
     status = find_actuator(file, "apa_2dof", &actuator, err);
   else {
-    status = find_model(file, name, &model, err);
+    status = pb_file_model_find(file, name, &model, err);
     actuator = cJSON_CreateString(name);
   }
   if (!status) return put(template, "actuator", actuator, err);
@@ -327,7 +327,7 @@ pb_status pb_variation_apply(const cJSON *file, const pb_variation *v, cJSON **o
   const cJSON *own;
   double value = NAN;
   *out = NULL;
-  pb_status status = find_template(file, &own, err);
+  pb_status status = pb_template_find(file, &own, err);
   if (!status) status = pb_variation_number(v, &value, err);
   if (status) return status;
   cJSON *copy = cJSON_Duplicate(file, 1);

@@ -38,7 +38,8 @@ typedef struct pb_study_kind_facts {
 // [any]
 const pb_study_kind_facts *pb_study_kind_of(pb_study_kind kind);
 
-// Stiffnesses for joint models whose joints in the file do not have them; NaN: not given.
+// Stiffnesses for joint models; NaN: as the file's joint has it, by its keys or by an element's
+// matrices, else as the other joint of the struts has it.
 typedef struct pb_joint_stiffness {
   double k_f, k_t;  // Nm/rad
   double k_a, k_s;  // N/m
@@ -48,6 +49,7 @@ typedef struct pb_variation {
   pb_study_kind kind;
   const char *text;  // the value as given: a number, "inf" (axial), or a name
   pb_joint_stiffness stiffness;
+  const char *directory;  // of element files; NULL: the working directory
 } pb_variation;
 
 // The plant file changed by a variation; the other template keys stay. *out is the caller's
@@ -60,10 +62,5 @@ pb_status pb_variation_apply(const cJSON *file, const pb_variation *variation, c
 // The number a value stands for (INFINITY for "inf"); NaN where values are names. Fails with
 // PB_ERR_ARGUMENT. [any]
 pb_status pb_variation_number(const pb_variation *variation, double *out, pb_error *err);
-
-// The object behind a joint or an actuator of the file: what "key" of the template names, with the
-// keys of its model written out. *out is the caller's. [init] PB_ERR_STATE, PB_ERR_REFERENCE,
-// PB_ERR_MEMORY.
-pb_status pb_template_part(const cJSON *file, const char *key, cJSON **out, pb_error *err);
 
 #endif
