@@ -75,9 +75,32 @@ static pb_status predict(const iff_result *r, iff_measurement *m, pb_error *err)
   return status;
 }
 
-void iff_compare(iff_measurement *m) {
+static double largest_expected(const iff_measurement *m, size_t o) {
+  double largest = 0;
+  for (size_t f = 0; f < m->frf.nf; f++) {
+    for (size_t i = 0; i < m->frf.nu; i++)
+      largest = fmax(largest, cabs(m->expected[(f * m->frf.ny + o) * m->frf.nu + i]));
+  }
+  return largest;
+}
+
+// An output that no driven input moves, by symmetry say, beside others of its unit: its response is
+// rounding.
+static bool negligible(const pb_signal *output, const pb_experiment_channels *ch,
+                       const iff_measurement *m, size_t o) {
+  const char *unit = output[ch->output[o]].unit;
+  double largest = 0;
+  for (size_t k = 0; k < m->frf.ny; k++) {
+    if (strcmp(output[ch->output[k]].unit, unit) == 0)
+      largest = fmax(largest, largest_expected(m, k));
+  }
+  return largest_expected(m, o) < 1e-6 * largest;
+}
+
+void iff_compare(const pb_signal *output, const pb_experiment_channels *ch, iff_measurement *m) {
   m->agreement.coherence = 1;
   for (size_t o = 0; o < m->frf.ny; o++) {
+    if (negligible(output, ch, m, o)) continue;
     pb_agreement one = pb_agreement_of(&m->frf, m->expected, o), *all = &m->agreement;
     if (one.magnitude_percent >= all->magnitude_percent) all->worst_hz = one.worst_hz;
     all->magnitude_percent = fmax(all->magnitude_percent, one.magnitude_percent);
@@ -97,7 +120,7 @@ static pb_status evaluate(const iff_result *r, pb_experiment *experiment, bool c
                                          m->frf.nf, &m->expected, err);
   }
   if (status != PB_OK) return status;
-  iff_compare(m);
+  iff_compare(r->model->output, &r->channels, m);
   pb_fit_channel channel[FIT_CHANNELS];
   size_t channels = pb_fit_channels(&m->frf, channel, FIT_CHANNELS);
   pb_fit_options options = {.sample_rate = r->model->sample_rate,

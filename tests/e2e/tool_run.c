@@ -47,9 +47,10 @@ tool_process tool_start(const char *name, uint32_t domain, const char *environme
   snprintf(file, sizeof file, "%s/%s", PB_BIN, name);
   snprintf(number, sizeof number, "%u", domain);
   argv[0] = file;
-  argv[1] = "--domain";
-  argv[2] = number;
-  argv[3 + words(copy, argv + 3, WORDS)] = NULL;
+  int count = 1 + words(copy, argv + 1, WORDS);  // a command comes before the options
+  argv[count++] = "--domain";
+  argv[count++] = number;
+  argv[count] = NULL;
   tool_process t = {.out = memfd_create("out", MFD_CLOEXEC),
                     .err = memfd_create("err", MFD_CLOEXEC)};
   assert_true(t.out >= 0 && t.err >= 0);
