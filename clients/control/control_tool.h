@@ -103,6 +103,10 @@ pb_status control_make_frame(control_design *design, pb_error *err);       // fr
 void control_frame_clear(control_frame *frame);
 pb_status control_prove(control_design *design, pb_error *err);  // prove.c
 
+// Oscillatory poles near which responses turn fast, of the plant and of the stages closed so far,
+// as far as the loops matter. Freed with pb_pole_list_clear. [init]
+pb_status control_near_poles(const control_design *design, pb_pole_list *out, pb_error *err);
+
 // Name of loop i in the frame: the metrology's or the motion's.
 const char *control_loop_name(const control_design *design, size_t i);
 

@@ -188,7 +188,7 @@ static void test_large(void **state) {
   REQUIRE(pb_hac_plant(m, &channels, &frame, &iff, 0, hz, 2, plant, &err));
   REQUIRE(pb_hac_gains(&h, hz, 1, plant, plant + 4, 2, false, gain, &err));
   bool seen[2] = {false, false};
-  for (double factor = 1e-3; factor < 2000; factor *= 12) {
+  for (double factor = 1; factor < 100; factor *= 30) {
     double scaled[2] = {factor * gain[0], factor * gain[1]};
     REQUIRE(pb_hac_controller(&h, scaled, &frame, 2, &hac, &err));
     REQUIRE(pb_hac_combine(&iff, 0, &hac, 0, 2, &both, &err));
