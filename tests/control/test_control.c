@@ -76,6 +76,7 @@ static void iff_finds_the_gain_and_the_damping(void **state) {
   assert_true(fabs(seen - smallest) < 1e-3 * smallest);
   assert_true(tool_member(tool_member(json, "controller"), "best")->type == cJSON_True);
   assert_true(exists("control-iff.json") && exists("iff.mat") && exists("iff-root-locus.csv"));
+  assert_true(exists("iff-predicted.csv") && exists("iff-predicted.mat"));
   cJSON_Delete(json);
 }
 
