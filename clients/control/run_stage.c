@@ -142,17 +142,21 @@ static pb_status expect(const run_result *r, control_stage stage, iff_measuremen
 pb_status run_stage_carry_out(run_result *r, control_stage stage, pb_error *err) {
   run_stage *s = &r->stage[stage];
   pb_experiment *experiment = NULL;
+  pb_experiment_layout layout = {0};
   FILE *samples = tmpfile();
   pb_status status = samples ? make_experiment(r, stage, &experiment, err)
                              : pb_fail(err, PB_ERR_IO, "samples", "no temporary file can be made");
   if (status == PB_OK) {
     pb_experiment_save_to(experiment, samples);
+    layout = pb_experiment_layout_of(experiment);
     status = with_controllers(r, stage, experiment, err);
     s->trouble = *pb_experiment_trouble_of(experiment);
   }
   if (status == PB_OK) status = pb_experiment_estimate(experiment, &s->response.frf, err);
   if (status == PB_OK) status = expect(r, stage, &s->response, err);
-  if (status == PB_OK) status = run_spectra(r, stage, experiment, samples, err);
+  if (status == PB_OK) {
+    status = run_spectra(r, stage, &layout, pb_experiment_period(experiment), samples, err);
+  }
   s->done = status == PB_OK;
   pb_experiment_free(experiment);
   if (samples) fclose(samples);

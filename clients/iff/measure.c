@@ -5,6 +5,7 @@
 
 #include "control/fit.h"
 #include "iff_tool.h"
+#include "plant/plant.h"
 
 enum { FIT_CHANNELS = 8 };
 
@@ -75,32 +76,33 @@ static pb_status predict(const iff_result *r, iff_measurement *m, pb_error *err)
   return status;
 }
 
-static double largest_expected(const iff_measurement *m, size_t o) {
-  double largest = 0;
-  for (size_t f = 0; f < m->frf.nf; f++) {
-    for (size_t i = 0; i < m->frf.nu; i++)
-      largest = fmax(largest, cabs(m->expected[(f * m->frf.ny + o) * m->frf.nu + i]));
+// The largest expected response of each output.
+static void largest_expected(const iff_measurement *m, double largest[PB_MAX_OUTPUTS]) {
+  for (size_t o = 0; o < m->frf.ny; o++) largest[o] = 0;
+  for (size_t k = 0; k < m->frf.nf * m->frf.ny * m->frf.nu; k++) {
+    size_t o = k / m->frf.nu % m->frf.ny;
+    largest[o] = fmax(largest[o], cabs(m->expected[k]));
   }
-  return largest;
 }
 
 // An output that no driven input moves, by symmetry say, beside others of its unit: its response is
 // rounding.
 static bool negligible(const pb_signal *output, const pb_experiment_channels *ch,
-                       const iff_measurement *m, size_t o) {
-  const char *unit = output[ch->output[o]].unit;
-  double largest = 0;
-  for (size_t k = 0; k < m->frf.ny; k++) {
-    if (strcmp(output[ch->output[k]].unit, unit) == 0)
-      largest = fmax(largest, largest_expected(m, k));
+                       const double *largest, size_t o) {
+  double most = 0;
+  for (size_t k = 0; k < ch->outputs; k++) {
+    if (strcmp(output[ch->output[k]].unit, output[ch->output[o]].unit) == 0)
+      most = fmax(most, largest[k]);
   }
-  return largest_expected(m, o) < 1e-6 * largest;
+  return largest[o] < 1e-6 * most;
 }
 
 void iff_compare(const pb_signal *output, const pb_experiment_channels *ch, iff_measurement *m) {
+  double largest[PB_MAX_OUTPUTS];
+  largest_expected(m, largest);
   m->agreement.coherence = 1;
   for (size_t o = 0; o < m->frf.ny; o++) {
-    if (negligible(output, ch, m, o)) continue;
+    if (negligible(output, ch, largest, o)) continue;
     pb_agreement one = pb_agreement_of(&m->frf, m->expected, o), *all = &m->agreement;
     if (one.magnitude_percent >= all->magnitude_percent) all->worst_hz = one.worst_hz;
     all->magnitude_percent = fmax(all->magnitude_percent, one.magnitude_percent);
