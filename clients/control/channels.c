@@ -7,8 +7,7 @@
 static const char *const forces[] = {"Fx", "Fy", "Fz", "Mx", "My", "Mz"};
 static const char *const motions[] = {"Dx", "Dy", "Dz", "Rx", "Ry", "Rz"};
 
-// Metrology of an actuator by name: dL… beside Va… or f….
-static int metrology_of(const pb_model *model, size_t input) {
+int control_metrology_of(const pb_model *model, size_t input) {
   static const char *const actuator[] = {"Va", "f"};
   const char *name = model->input[input].name;
   for (size_t k = 0; k < 2; k++) {
@@ -51,7 +50,7 @@ static pb_status choose_metrology(control_design *d, pb_error *err) {
   if (!d->metrology) return pb_fail_memory(err, "metrology");
   for (size_t k = 0; k < d->n; k++) {
     const char *name = m->input[d->channels.input[k]].name;
-    int output = metrology_of(m, d->channels.input[k]);
+    int output = control_metrology_of(m, d->channels.input[k]);
     if (output < 0) {
       return pb_fail(err, PB_ERR_REFERENCE, name,
                      "the plant has no output dL… of the same name: use --metrology");

@@ -55,6 +55,8 @@ static pb_status damp(const iff_command *o, pb_error *err) {
   status = iff_prepare(&o->iff, &plant.bench, &result, err);
   if (status == PB_OK && o->live) status = iff_measure(&result, &plant.bench, err);
   if (status == PB_OK) status = iff_present(&result, err);
+  if (status == PB_OK && (o->iff.output_dir || o->iff.plot))
+    status = control_damped_plant(&result, err);
   if (status == PB_OK && o->iff.output_dir)
     status = control_export(&result, NULL, o->iff.output_dir, err);
   iff_result_clear(&result);

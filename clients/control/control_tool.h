@@ -100,8 +100,13 @@ void control_design_clear(control_design *design);
 // design.c's parts.
 pb_status control_choose_channels(control_design *design, pb_error *err);  // channels.c
 pb_status control_make_frame(control_design *design, pb_error *err);       // frame.c
+int control_metrology_of(const pb_model *model, size_t input);  // dL… beside Va… or f…, or −1
 void control_frame_clear(control_frame *frame);
 pb_status control_prove(control_design *design, pb_error *err);  // prove.c
+
+// Oscillatory poles near which responses turn fast, of the plant and of the stages closed so far,
+// as far as the loops matter. Freed with pb_pole_list_clear. [init]
+pb_status control_near_poles(const control_design *design, pb_pole_list *out, pb_error *err);
 
 // Name of loop i in the frame: the metrology's or the motion's.
 const char *control_loop_name(const control_design *design, size_t i);
@@ -143,6 +148,9 @@ pb_status control_save(const control_design *design, const control_judgement *j,
                        pb_error *err);
 pb_status control_plot(const control_design *design, const control_judgement *j, const char *dir,
                        pb_error *err);
+
+// The plant with IFF as predicted: iff-predicted.csv, .mat and figures, as the options say. [init]
+pb_status control_damped_plant(const iff_result *iff, pb_error *err);
 
 // Bodies of host_controller requests.
 void control_write_iff(FILE *stream, const iff_result *iff);

@@ -20,12 +20,12 @@ static const pb_lti *iff_of(const control_design *d) {
   return d->damped ? &d->iff.controller_used : NULL;
 }
 
-// From the bandwidth on, fine where the plant has modes.
+// From the bandwidth on, fine where the damped plant has modes.
 static pb_status gain_grid(const control_design *d, double **hz, size_t *count, pb_error *err) {
   enum { POINTS = 300 };
   pb_pole_list poles = {0};
   *hz = NULL;
-  pb_status status = pb_all_poles(d->model, &poles, err);
+  pb_status status = control_near_poles(d, &poles, err);
   if (status == PB_OK) {
     status = pb_margins_grid(d->shape.bandwidth_hz, d->model->sample_rate / 2, POINTS, &poles, hz,
                              count, err);
@@ -69,25 +69,27 @@ static pb_status close_stage(control_design *d, control_stage stage, pb_lti *con
   return pb_loop_solver_new(&d->loop[stage], &d->solver[stage], err);
 }
 
-static pb_status make_controllers(control_design *d, pb_error *err) {
+static pb_status close_iff(control_design *d, pb_error *err) {
   size_t n = d->n;
-  pb_status status =
-      pb_hac_controller(&d->shape_lti, d->gain, &d->frame.transform, n, &d->hac, err);
-  if (status == PB_OK && d->damped) {
-    status = pb_hac_combine(iff_of(d), d->iff_delay, NULL, 0, n, &d->low, err);
-  }
-  if (status == PB_OK) {
-    status = pb_hac_combine(iff_of(d), d->iff_delay, &d->hac, d->hac_delay, n, &d->both, err);
-  }
   d->read = malloc(2 * n * sizeof *d->read);
-  if (status == PB_OK && !d->read) status = pb_fail_memory(err, "loops");
-  for (size_t k = 0; d->read && k < n; k++) {
+  if (!d->read) return pb_fail_memory(err, "loops");
+  for (size_t k = 0; k < n; k++) {
     d->read[k] = d->channels.sensor[k];
     d->read[n + k] = d->metrology[k];
   }
-  if (status == PB_OK && d->damped) status = close_stage(d, STAGE_IFF, &d->low, err);
-  if (status == PB_OK) status = close_stage(d, STAGE_HAC, &d->both, err);
-  return status;
+  if (!d->damped) return PB_OK;
+  pb_status status = pb_hac_combine(iff_of(d), d->iff_delay, NULL, 0, n, &d->low, err);
+  return status == PB_OK ? close_stage(d, STAGE_IFF, &d->low, err) : status;
+}
+
+static pb_status close_hac(control_design *d, pb_error *err) {
+  size_t n = d->n;
+  pb_status status =
+      pb_hac_controller(&d->shape_lti, d->gain, &d->frame.transform, n, &d->hac, err);
+  if (status == PB_OK) {
+    status = pb_hac_combine(iff_of(d), d->iff_delay, &d->hac, d->hac_delay, n, &d->both, err);
+  }
+  return status == PB_OK ? close_stage(d, STAGE_HAC, &d->both, err) : status;
 }
 
 // In real time a client's answer acts a step later; what the daemon hosts acts at once, as in
@@ -110,8 +112,9 @@ pb_status control_design_make(const control_options *options, const control_plan
   pb_status status = pb_hac_shape_discrete(&d->shape, d->model->sample_rate, &d->shape_lti, err);
   if (status == PB_OK) status = control_choose_channels(d, err);
   if (status == PB_OK) status = control_make_frame(d, err);
+  if (status == PB_OK) status = close_iff(d, err);
   if (status == PB_OK) status = find_gains(d, err);
-  if (status == PB_OK) status = make_controllers(d, err);
+  if (status == PB_OK) status = close_hac(d, err);
   if (status == PB_OK) status = control_prove(d, err);
   if (status != PB_OK) control_design_clear(d);
   return status;

@@ -14,10 +14,8 @@ static pb_status add_poles(pb_pole_list *all, const pb_pole_list *more, pb_error
   return PB_OK;
 }
 
-// Poles near which responses turn fast: of the plant, damped and controlled, as far as the loops
-// matter.
-static pb_status near_poles(const control_design *d, double highest, pb_pole_list *all,
-                            pb_error *err) {
+pb_status control_near_poles(const control_design *d, pb_pole_list *all, pb_error *err) {
+  double highest = fmin(d->model->sample_rate / 2, 20 * d->shape.bandwidth_hz);
   pb_status status = pb_all_poles(d->model, all, err);
   for (int s = STAGE_IFF; s < STAGES && status == PB_OK; s++) {
     pb_pole_list some = {0};
@@ -37,7 +35,7 @@ static pb_status near_poles(const control_design *d, double highest, pb_pole_lis
 static pb_status make_grid(const control_design *d, control_judgement *j, pb_error *err) {
   double nyquist = d->model->sample_rate / 2, bandwidth = d->shape.bandwidth_hz;
   pb_pole_list poles = {0};
-  pb_status status = near_poles(d, fmin(nyquist, 20 * bandwidth), &poles, err);
+  pb_status status = control_near_poles(d, &poles, err);
   if (status == PB_OK) {
     status =
         pb_margins_grid(fmin(0.1, 1e-3 * bandwidth), nyquist, POINTS, &poles, &j->hz, &j->nf, err);

@@ -36,9 +36,10 @@ double run_rms(const run_result *r, control_stage stage, size_t motion, int whic
 // Runs a stage over the bus and evaluates it. [init]
 pb_status run_stage_carry_out(run_result *r, control_stage stage, pb_error *err);
 
-// Spectra of the motions and largest inputs from the samples that the experiment wrote. [init]
-pb_status run_spectra(run_result *r, control_stage stage, const pb_experiment *experiment,
-                      FILE *samples, pb_error *err);
+// Spectra of the motions and largest inputs from the samples that the experiment wrote; layout: of
+// its round, told before it began. [init]
+pb_status run_spectra(run_result *r, control_stage stage, const pb_experiment_layout *layout,
+                      size_t period, FILE *samples, pb_error *err);
 
 // Measured sensitivity H_HAC H⁻¹ beside the predicted one, where there are as many disturbances as
 // loops. [init]

@@ -24,14 +24,12 @@ typedef struct spectra {
   double *row;  // [nu + ny]
 } spectra;
 
-static pb_status spectra_new(const run_result *r, const pb_experiment *experiment, spectra *s,
-                             pb_error *err) {
+static pb_status spectra_new(const run_result *r, const pb_experiment_layout *layout, size_t period,
+                             spectra *s, pb_error *err) {
   const control_design *d = r->design;
   bool periodic = r->experiment.excitation != PB_EXCITE_NOISE;
-  *s = (spectra){.r = r,
-                 .layout = pb_experiment_layout_of(experiment),
-                 .length = pb_experiment_period(experiment),
-                 .signals = d->disturbances + d->motions};
+  *s = (spectra){
+      .r = r, .layout = *layout, .length = period, .signals = d->disturbances + d->motions};
   // Whole periods need no window and no overlap.
   s->hop = periodic ? s->length : s->length / 2;
   s->psd = calloc(s->signals, sizeof(pb_psd *));
@@ -141,11 +139,11 @@ static pb_status evaluate(run_result *r, run_stage *stage, const spectra *s, pb_
   return PB_OK;
 }
 
-pb_status run_spectra(run_result *r, control_stage which, const pb_experiment *experiment,
-                      FILE *samples, pb_error *err) {
+pb_status run_spectra(run_result *r, control_stage which, const pb_experiment_layout *layout,
+                      size_t period, FILE *samples, pb_error *err) {
   run_stage *stage = &r->stage[which];
   spectra s;
-  pb_status status = spectra_new(r, experiment, &s, err);
+  pb_status status = spectra_new(r, layout, period, &s, err);
   stage->largest = calloc(r->design->n, sizeof *stage->largest);
   if (status == PB_OK && !stage->largest) status = pb_fail_memory(err, "spectra");
   if (status == PB_OK) status = read_samples(&s, samples, stage->largest, err);

@@ -60,8 +60,10 @@ typedef struct iff_measurement {
   pb_run_report report;
 } iff_measurement;
 
-// Fills the agreement of a measured response with the expected one. [any]
-void iff_compare(iff_measurement *measurement);
+// Fills the agreement of a measured response with the expected one, over the outputs (of the
+// model's list) that the inputs move. [any]
+void iff_compare(const pb_signal *output, const pb_experiment_channels *channels,
+                 iff_measurement *measurement);
 void iff_measurement_clear(iff_measurement *measurement);
 
 typedef struct iff_result {

@@ -76,11 +76,11 @@ pb_status iff_print(const iff_result *r, pb_error *err) {
   print_head(r);
   pb_status status = print_modes(r, err);
   printf("\n");
-  if (r->searched) {
-    printf("Smallest damping of the modes that IFF reaches: %.4g %%, the largest of any gain that "
-           "can be doubled\n",
-           100 * r->best.smallest_damping);
-  }
+  double smallest = INFINITY;
+  for (size_t k = 0; k < r->modes; k++)
+    smallest = fmin(smallest, r->mode[k].closed_predicted.damping);
+  printf("Smallest damping of these modes: %.4g %%%s\n", 100 * smallest,
+         r->searched ? ", the gain sought among those that can be doubled" : "");
   print_agreement("Undamped", &r->open);
   print_agreement("Damped", &r->closed);
   if (!r->stable) {

@@ -2,6 +2,7 @@
 #include "control/margins.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdlib.h>
 
 // arg L + π in −π … π: the angle to the point −1 as seen from 0.
@@ -30,11 +31,16 @@ static void at_real_axis(pb_margins *m, double hz, double re) {
   }
 }
 
+// A peak that just touches 1, to rounding, is no crossing.
+static bool above_unity(double log_gain) {
+  return log_gain > 1e-6;
+}
+
 // Crossings between two neighbours: |L| by its logarithm, the angle linearly.
 static void between(pb_margins *m, double f0, double f1, double complex l0, double complex l1) {
   double g0 = log(cabs(l0)), g1 = log(cabs(l1));
-  if ((g0 > 0) != (g1 > 0)) {
-    double part = g0 / (g0 - g1);
+  if (above_unity(g0) != above_unity(g1)) {
+    double part = fmin(fmax(g0 / (g0 - g1), 0), 1);
     double turn = carg(l1 / l0);
     at_unit_gain(m, f0 + part * (f1 - f0), l0 / cabs(l0) * cexp(CMPLX(0, part * turn)));
   }
