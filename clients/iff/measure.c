@@ -75,7 +75,7 @@ static pb_status predict(const iff_result *r, iff_measurement *m, pb_error *err)
   return status;
 }
 
-static void compare(iff_measurement *m) {
+void iff_compare(iff_measurement *m) {
   m->agreement.coherence = 1;
   for (size_t o = 0; o < m->frf.ny; o++) {
     pb_agreement one = pb_agreement_of(&m->frf, m->expected, o), *all = &m->agreement;
@@ -97,7 +97,7 @@ static pb_status evaluate(const iff_result *r, pb_experiment *experiment, bool c
                                          m->frf.nf, &m->expected, err);
   }
   if (status != PB_OK) return status;
-  compare(m);
+  iff_compare(m);
   pb_fit_channel channel[FIT_CHANNELS];
   size_t channels = pb_fit_channels(&m->frf, channel, FIT_CHANNELS);
   pb_fit_options options = {.sample_rate = r->model->sample_rate,

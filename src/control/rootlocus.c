@@ -177,9 +177,8 @@ void pb_best_gain_clear(pb_best_gain *best) {
   *best = (pb_best_gain){0};
 }
 
-// Row sum of |L| averaged (geometric mean) over the band: the gain at which the loop gain is
-// about 1.
-static pb_status unit_gain(const pb_loop *loop, double f1, double f2, double *gain, pb_error *err) {
+pb_status pb_loop_unit_gain(const pb_loop *loop, double f1, double f2, double *gain,
+                            pb_error *err) {
   enum { POINTS = 25 };
   size_t n = loop->controller->ny;
   double hz[POINTS];
@@ -319,7 +318,7 @@ pb_status pb_best_gain_find(pb_loop_solver *s, double f1, double f2, double deca
   double unit = 1;
   pb_rootlocus l = {0};
   bool unstable[SEARCH_GAINS] = {false};
-  pb_status status = unit_gain(pb_loop_solver_loop(s), f1, f2, &unit, err);
+  pb_status status = pb_loop_unit_gain(pb_loop_solver_loop(s), f1, f2, &unit, err);
   if (status == PB_OK) status = start(s, SEARCH_GAINS, f1, f2, &l, err);
   if (status != PB_OK) goto done;
   l.gain[0] = 0;

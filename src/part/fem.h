@@ -29,9 +29,10 @@ typedef struct pb_fem_frame {
 typedef struct pb_fem {
   char *name;
   size_t nodes;
-  double *xyz;     // 3 × nodes, m, part axes
-  int64_t *dof;    // 3 × nodes: row of K and M of ux, uy, uz of each node; −1: there is none
-  pb_sparse k, m;  // n × n, N/m and kg
+  double *xyz;      // 3 × nodes, m, part axes
+  int64_t *number;  // [nodes] the nodes' numbers in messages and reports; NULL: index + 1
+  int64_t *dof;     // 3 × nodes: row of K and M of ux, uy, uz of each node; −1: there is none
+  pb_sparse k, m;   // n × n, N/m and kg
   size_t frames;
   pb_fem_frame *frame;
 } pb_fem;
@@ -42,5 +43,13 @@ void pb_fem_clear(pb_fem *fem);  // frees all that it holds; a zeroed one is all
 // from fem->xyz. Fails with PB_ERR_MEMORY. [init]
 pb_status pb_fem_frame_weights(const pb_fem *fem, pb_fem_frame *frame, const double *w,
                                pb_error *err);
+
+// Moments of the mass that M has between the frame's nodes, direction by direction the same:
+// weights that follow the area of the faces they stand on where elements are of one depth. Fails
+// with PB_ERR_MEMORY, PB_ERR_ARGUMENT (no mass at these nodes). [init]
+pb_status pb_fem_frame_mass(const pb_fem *fem, pb_fem_frame *frame, pb_error *err);
+
+// The number by which messages name a node. [any]
+int64_t pb_fem_node_number(const pb_fem *fem, size_t node);
 
 #endif

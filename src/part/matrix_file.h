@@ -54,10 +54,26 @@ pb_status pb_matrix_file_read(const char *path, const char *name, pb_matrix_file
                               pb_error *err);
 void pb_matrix_file_clear(pb_matrix_file *file);
 
-// As a symmetric sparse matrix: one triangle as it is; both triangles by their mean where they
-// agree to 1e-6 of √(x_ii x_jj), else PB_ERR_ELEMENT. [init]
+// As a symmetric sparse matrix: of a `half` file the one triangle as it is (PB_ERR_ELEMENT where
+// entries lie in both); of another one the mean of both triangles where they agree to 1e-6 of
+// √(x_ii x_jj), else PB_ERR_ELEMENT, which says so where only one triangle is there. Entries of
+// equal place are added up. Fails with PB_ERR_MEMORY, too. path names the file in errors. [init]
 pb_status pb_matrix_file_symmetric(const pb_matrix_file *file, const char *path, pb_sparse *out,
                                    pb_error *err);
+
+// Labels of the rows of a matrix in their order. Readers: Ansys MLIST listings (the masters),
+// CalculiX .dof files, CSV (node, direction).
+typedef struct pb_dof_file {
+  size_t count;
+  pb_row_label *label;  // [count]
+} pb_dof_file;
+
+// Whether a file, of nodes as a rule, has an Ansys list of masters in it. [init]
+pb_status pb_dof_file_has_masters(const char *path, bool *out, pb_error *err);
+
+// Fails with PB_ERR_IO, PB_ERR_SYNTAX, PB_ERR_MEMORY. [init]
+pb_status pb_dof_file_read(const char *path, pb_dof_file *out, pb_error *err);
+void pb_dof_file_clear(pb_dof_file *file);
 
 // A node list: numbers and coordinates. Readers: Ansys NLIST and MLIST listings, CalculiX/Abaqus
 // *NODE blocks, CSV (node, x, y, z), Matrix Market and MAT n × 3 arrays (numbered from 1).

@@ -27,7 +27,8 @@ typedef enum pb_reduce_phase {
 typedef struct pb_reduce_options {
   size_t modes;  // p by count …
   double max_hz;  // … or, when > 0, all fixed-interface modes up to this frequency (at most `modes`
-                  // of them where modes > 0)
+                  // of them where modes > 0): their number is proven by a count
+  bool prove;  // prove by a count that no mode is missing where they are asked for by number, too
   size_t check_points;  // frequencies at which the element is compared with the full model; 0: none
   double check_to_hz;   // highest of them; 0: half the last kept mode's frequency
   // Called when a phase starts (done = 0) and as it goes; total ≤ 0: unknown. Returning false stops
@@ -38,6 +39,7 @@ typedef struct pb_reduce_options {
 
 typedef struct pb_reduce_check {
   double hz;
+  size_t fixed_below, free_below;  // modes of the full model below hz, frames held and free
   double error;  // largest |difference| of the 6n × 6n dynamic stiffness response, relative to the
                  // full model's largest entry of the same units, over all pairs of frame DoFs
 } pb_reduce_check;
@@ -54,6 +56,7 @@ typedef struct pb_reduction {
   double seconds[PB_REDUCE_PHASES];
   double rigid_residual;  // ‖K R‖ relative to K's own size, R the six rigid motions of the element
   double mass, full_mass;  // kg: RᵀMR of the element; of the full model
+  double proven_hz;  // all modes below are kept, by a count of the full model's; 0: not counted
   size_t checks;
   pb_reduce_check *check;  // [checks]
 } pb_reduction;

@@ -25,6 +25,10 @@ pb_status pb_sparse_from_entries(size_t n, size_t count, const int64_t *row, con
 // y ← A x for `columns` columns, x and y n × columns with leading dimension n. [any]
 void pb_sparse_multiply(const pb_sparse *a, size_t columns, const double *x, double *y);
 
+// y ← (A ⊗ I₃) x: the same where each row stands for the three translations of a node, x and y
+// 3n × columns. [any]
+void pb_sparse_multiply_triple(const pb_sparse *a, size_t columns, const double *x, double *y);
+
 void pb_sparse_clear(pb_sparse *a);
 
 #endif

@@ -32,6 +32,18 @@ typedef struct pb_element {
   pb_element_health health;
 } pb_element;
 
+// What a file says, before anything is checked or made symmetric.
+typedef struct pb_element_data {
+  size_t frames, size;  // n, m
+  double *position;     // 3 × n, m
+  double *k, *m;        // size × size
+} pb_element_data;
+
+// Reads K, M and int_xyz from a MAT v5 file as they are. Fails with PB_ERR_IO, PB_ERR_SYNTAX,
+// PB_ERR_MEMORY. *out is owned by the caller. [init]
+pb_status pb_element_data_load(const char *path, pb_element_data *out, pb_error *err);
+void pb_element_data_clear(pb_element_data *data);
+
 // Reads K, M and int_xyz from a MAT v5 file (other variables, MATLAB objects too, are ignored) and
 // checks them. Warnings: asymmetry, rigid-body residual. [init]
 // Fails with PB_ERR_IO (file), PB_ERR_SYNTAX (not a MAT file, variables missing or of the wrong

@@ -101,6 +101,11 @@ static void test_bench_electronics(void **state) {
             "apa300ml-bench-electronics");
 }
 
+static void test_bench_resistor(void **state) {
+  (void)state;
+  fail_each(load, PB_TEST_DATA "/resistor-bench.json", "resistor-bench");
+}
+
 static void test_hexapod(void **state) {
   (void)state;
   fail_each(load, PB_CONFIG "/plants/nano-hexapod.json", "nano-hexapod");
@@ -210,13 +215,10 @@ int main(void) {
   cJSON_Hooks hooks = {__wrap_malloc, free};
   cJSON_InitHooks(&hooks);
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_bench),
-      cmocka_unit_test(test_bench_electronics),
-      cmocka_unit_test(test_hexapod),
-      cmocka_unit_test(test_elements),
-      cmocka_unit_test(test_transfer),
-      cmocka_unit_test(test_loop),
-      cmocka_unit_test(test_pack_and_truncate),
+      cmocka_unit_test(test_bench),          cmocka_unit_test(test_bench_electronics),
+      cmocka_unit_test(test_bench_resistor), cmocka_unit_test(test_hexapod),
+      cmocka_unit_test(test_elements),       cmocka_unit_test(test_transfer),
+      cmocka_unit_test(test_loop),           cmocka_unit_test(test_pack_and_truncate),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,371 @@
+// Frames in terms of rows of K: their ties, what is connected with what, and the six rows that hold
+// a free part while its stiffness is factored.
+//
+// The tie of an averaged frame is C = (RᵀGR)⁻¹RᵀG, R the rigid motions of its nodes about its
+// origin, G = g ⊗ I₃: node i has RᵀG_i = [m₀ I; [m₁]×] with the moments m₀ = Σ g_ij and
+// m₁ = Σ g_ij x_j of fem.h.
+#include "part/reduce_internal.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/lapack.h"
+
+// ---- rows and nodes -----------------------------------------------------------------------------
+
+static pb_status check_matrices(const pb_fem *fem, pb_error *err) {
+  if (!fem->frames) return pb_fail(err, PB_ERR_ARGUMENT, fem->name, "has no interface frame");
+  if (fem->k.n != fem->m.n || !fem->k.n)
+    return pb_fail(err, PB_ERR_ARGUMENT, fem->name, "K has %zu rows and M %zu", fem->k.n, fem->m.n);
+  const pb_sparse *both[2] = {&fem->k, &fem->m};
+  for (size_t i = 0; i < 2; i++)
+    for (int64_t at = 0; at < both[i]->start[both[i]->n]; at++)
+      if (!isfinite(both[i]->value[at]))
+        return pb_fail(err, PB_ERR_ARGUMENT, fem->name, "%s has an entry that is not finite",
+                       i ? "M" : "K");
+  return PB_OK;
+}
+
+static pb_status map_rows(reduce_work *w, pb_error *err) {
+  const pb_fem *fem = w->fem;
+  w->node_of_row = malloc(w->full * sizeof *w->node_of_row);
+  w->rigid_row = calloc(w->full, sizeof *w->rigid_row);
+  w->held = calloc(w->full, sizeof *w->held);
+  if (!w->node_of_row || !w->rigid_row || !w->held) return pb_fail_memory(err, fem->name);
+  for (size_t r = 0; r < w->full; r++) w->node_of_row[r] = SIZE_MAX;
+  for (size_t i = 0; i < 3 * fem->nodes; i++) {
+    int64_t r = fem->dof[i];
+    if (r < 0) continue;
+    if ((size_t)r >= w->full || w->node_of_row[r] != SIZE_MAX)
+      return pb_fail(err, PB_ERR_ARGUMENT, fem->name, "row %" PRId64 " of node %" PRId64 " %s",
+                     r + 1, pb_fem_node_number(fem, i / 3),
+                     (size_t)r >= w->full ? "is beyond the matrices" : "is another node's too");
+    w->node_of_row[r] = i / 3;
+  }
+  for (size_t r = 0; r < w->full; r++) {
+    if (w->node_of_row[r] == SIZE_MAX)
+      return pb_fail(err, PB_ERR_ARGUMENT, fem->name, "row %zu of K belongs to no node", r + 1);
+    int64_t last = fem->k.start[r + 1] - 1;
+    bool diagonal = last >= fem->k.start[r] && fem->k.row[last] == (int64_t)r;
+    if (!diagonal || !(fem->k.value[last] > 0))
+      return pb_fail(err, PB_ERR_SINGULAR, fem->name,
+                     "row %zu of K (node %" PRId64 ") has no positive diagonal: nothing holds it",
+                     r + 1, pb_fem_node_number(fem, w->node_of_row[r]));
+  }
+  return PB_OK;
+}
+
+// ---- ties ---------------------------------------------------------------------------------------
+
+// R_i of a point at x from the origin, 3 × 6 column-major: u = v + ω × x.
+static void rigid_tie(const double x[3], double tie[18]) {
+  memset(tie, 0, 18 * sizeof *tie);
+  for (int a = 0; a < 3; a++) {
+    int b = (a + 1) % 3, c = (a + 2) % 3;
+    tie[a + 3 * a] = 1;
+    tie[b + 3 * (3 + a)] = -x[c];
+    tie[c + 3 * (3 + a)] = x[b];
+  }
+}
+
+static void node_offset(const pb_fem *fem, const pb_fem_frame *frame, size_t i, double x[3]) {
+  for (size_t a = 0; a < 3; a++) x[a] = fem->xyz[a + 3 * frame->node[i]] - frame->origin[a];
+}
+
+// RᵀG_i, 6 × 3 column-major.
+static void weigh_node(const double moment[4], double out[18]) {
+  memset(out, 0, 18 * sizeof *out);
+  for (int a = 0; a < 3; a++) {
+    int b = (a + 1) % 3, c = (a + 2) % 3;
+    out[a + 6 * a] = moment[0];
+    // The moment about a of a force along b is −x_c, along c is x_b.
+    out[3 + a + 6 * b] = -moment[1 + c];
+    out[3 + a + 6 * c] = moment[1 + b];
+  }
+}
+
+// LU of RᵀGR, its rotations scaled by the frame's size.
+typedef struct motions {
+  double g[36], scale[6];
+  int pivot[6];
+} motions;
+
+static pb_status factor_motions(const pb_fem_frame *frame, double size, motions *m, pb_error *err) {
+  double largest = 0, rcond = 0, work[24];
+  int six = 6, info = 0, iwork[6];
+  for (int i = 0; i < 6; i++) m->scale[i] = i < 3 ? 1 : 1 / size;
+  for (int j = 0; j < 6; j++) {
+    double sum = 0;
+    for (int i = 0; i < 6; i++) sum += fabs(m->g[i + 6 * j] *= m->scale[i] * m->scale[j]);
+    largest = fmax(largest, sum);
+  }
+  dgetrf_(&six, &six, m->g, &six, m->pivot, &info);
+  if (!info) dgecon_("1", &six, m->g, &six, &largest, &rcond, work, iwork, &info);
+  if (info || !(rcond > 1e-10))
+    return pb_fail(err, PB_ERR_ARGUMENT, frame->name,
+                   "the frame's %zu nodes do not define its six motions: they lie on a line, or "
+                   "their weights vanish",
+                   frame->nodes);
+  return PB_OK;
+}
+
+// RᵀGR of the frame's nodes; for a rigid frame, where G only tells whether they lie on a line, I.
+static pb_status tie_nodes(const pb_fem *fem, const reduce_frame *f, motions *m, pb_error *err) {
+  double size = 0;
+  *m = (motions){0};
+  for (size_t i = 0; i < f->from->nodes; i++) {
+    double x[3], r[18], weighed[18];
+    node_offset(fem, f->from, i, x);
+    size = fmax(size, sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]));
+    rigid_tie(x, r);
+    if (f->rigid) {
+      const double moment[4] = {1, x[0], x[1], x[2]};
+      weigh_node(moment, weighed);
+    } else {
+      weigh_node(f->from->moment + 4 * i, weighed);
+    }
+    for (int c = 0; c < 6; c++)
+      for (int d = 0; d < 3; d++)
+        for (int row = 0; row < 6; row++) m->g[row + 6 * c] += weighed[row + 6 * d] * r[d + 3 * c];
+    memcpy(f->tie + 18 * i, f->rigid ? r : weighed, sizeof r);
+  }
+  return factor_motions(f->from, size > 0 ? size : 1, m, err);
+}
+
+static pb_status tie_average(const pb_fem *fem, const reduce_frame *f, pb_error *err) {
+  motions m;
+  int six = 6, info = 0, columns = (int)(3 * f->from->nodes);
+  if (!f->from->moment)
+    return pb_fail(err, PB_ERR_ARGUMENT, f->from->name, "an averaged frame needs weights");
+  pb_status st = tie_nodes(fem, f, &m, err);
+  if (st) return st;
+  for (size_t i = 0; i < 18 * f->from->nodes; i++) f->tie[i] *= m.scale[i % 6];
+  dgetrs_("N", &six, &columns, m.g, &six, m.pivot, f->tie, &six, &info);
+  for (size_t i = 0; i < 18 * f->from->nodes; i++) f->tie[i] *= m.scale[i % 6];
+  return PB_OK;
+}
+
+static pb_status tie_rigid(reduce_work *w, const reduce_frame *f, pb_error *err) {
+  motions m;
+  const pb_fem_frame *frame = f->from;
+  pb_status st = tie_nodes(w->fem, f, &m, err);
+  for (size_t i = 0; !st && i < 3 * frame->nodes; i++) {
+    size_t node = frame->node[i / 3];
+    int64_t r = w->fem->dof[i % 3 + 3 * node];
+    if (r < 0) {
+      st = pb_fail(err, PB_ERR_ARGUMENT, frame->name,
+                   "node %" PRId64 " of a rigid frame cannot move: K has no row for it",
+                   pb_fem_node_number(w->fem, node));
+    } else if (w->rigid_row[r]) {
+      st = pb_fail(err, PB_ERR_ARGUMENT, frame->name,
+                   "node %" PRId64 " is in two rigid frames, or twice in this one",
+                   pb_fem_node_number(w->fem, node));
+    } else {
+      w->rigid_row[r] = w->held[r] = true;
+    }
+  }
+  return st;
+}
+
+static pb_status check_frame(const pb_fem *fem, const pb_fem_frame *frame, pb_error *err) {
+  size_t rows = 0;
+  for (size_t i = 0; i < frame->nodes; i++) {
+    if (frame->node[i] >= fem->nodes)
+      return pb_fail(err, PB_ERR_ARGUMENT, frame->name, "the model has no node of index %zu",
+                     frame->node[i]);
+    for (size_t d = 0; d < 3; d++) rows += fem->dof[d + 3 * frame->node[i]] >= 0;
+  }
+  if (!rows)
+    return pb_fail(err, PB_ERR_ARGUMENT, frame->name,
+                   frame->nodes ? "K has no row for any of the frame's nodes" : "has no nodes");
+  return PB_OK;
+}
+
+static pb_status tie_frames(reduce_work *w, pb_error *err) {
+  const pb_fem *fem = w->fem;
+  w->frame = calloc(w->frames, sizeof *w->frame);
+  if (!w->frame) return pb_fail_memory(err, fem->name);
+  pb_status st = PB_OK;
+  for (size_t f = 0; !st && f < w->frames; f++) {
+    reduce_frame *frame = &w->frame[f];
+    frame->from = &fem->frame[f];
+    frame->rigid = frame->from->tie == PB_TIE_RIGID;
+    st = check_frame(fem, frame->from, err);
+    if (st) break;
+    frame->tie = malloc(18 * frame->from->nodes * sizeof(double));
+    if (!frame->tie) return pb_fail_memory(err, fem->name);
+    st = frame->rigid ? tie_rigid(w, frame, err) : tie_average(fem, frame, err);
+    w->averaged += !frame->rigid;
+  }
+  return st;
+}
+
+void reduce_average(const reduce_work *w, size_t columns, const double *u, double *out, size_t ld) {
+  for (size_t f = 0; f < w->frames; f++) {
+    const reduce_frame *frame = &w->frame[f];
+    for (size_t c = 0; !frame->rigid && c < columns; c++) {
+      double *q = out + frame->border - w->pins + c * ld;
+      memset(q, 0, 6 * sizeof *q);
+      for (size_t i = 0; i < 3 * frame->from->nodes; i++) {
+        int64_t r = w->fem->dof[i % 3 + 3 * frame->from->node[i / 3]];
+        double value = r < 0 ? 0 : u[(size_t)r + c * w->full];
+        for (size_t a = 0; a < 6; a++) q[a] += frame->tie[a + 6 * i] * value;
+      }
+    }
+  }
+}
+
+void reduce_spread(const reduce_work *w, size_t columns, const double *z, size_t ld, double *u) {
+  for (size_t f = 0; f < w->frames; f++) {
+    const reduce_frame *frame = &w->frame[f];
+    for (size_t c = 0; !frame->rigid && c < columns; c++) {
+      const double *q = z + frame->border - w->pins + c * ld;
+      for (size_t i = 0; i < 3 * frame->from->nodes; i++) {
+        int64_t r = w->fem->dof[i % 3 + 3 * frame->from->node[i / 3]];
+        for (size_t a = 0; r >= 0 && a < 6; a++)
+          u[(size_t)r + c * w->full] += frame->tie[a + 6 * i] * q[a];
+      }
+    }
+  }
+}
+
+void reduce_move_rigid(const reduce_work *w, size_t f, size_t d, double *u) {
+  const reduce_frame *frame = &w->frame[f];
+  for (size_t i = 0; i < 3 * frame->from->nodes; i++) {
+    int64_t r = w->fem->dof[i % 3 + 3 * frame->from->node[i / 3]];
+    if (r >= 0) u[r] += frame->tie[18 * (i / 3) + i % 3 + 3 * d];
+  }
+}
+
+// ---- pieces -------------------------------------------------------------------------------------
+
+static size_t root_of(size_t *parent, size_t i) {
+  while (parent[i] != i) i = parent[i] = parent[parent[i]];
+  return i;
+}
+
+// Nodes hang together through entries of K and through rigid frames; an average ties nothing.
+static pb_status check_connected(const reduce_work *w, pb_error *err) {
+  const pb_fem *fem = w->fem;
+  size_t *parent = malloc(fem->nodes * sizeof *parent);
+  if (!parent) return pb_fail_memory(err, fem->name);
+  for (size_t i = 0; i < fem->nodes; i++) parent[i] = i;
+  for (size_t j = 0; j < w->full; j++)
+    for (int64_t at = fem->k.start[j]; at < fem->k.start[j + 1]; at++)
+      if (fem->k.value[at] != 0)
+        parent[root_of(parent, w->node_of_row[fem->k.row[at]])] =
+            root_of(parent, w->node_of_row[j]);
+  for (size_t f = 0; f < w->frames; f++)
+    for (size_t i = 1; w->frame[f].rigid && i < fem->frame[f].nodes; i++)
+      parent[root_of(parent, fem->frame[f].node[i])] = root_of(parent, fem->frame[f].node[0]);
+  size_t first = w->node_of_row[0], whole = root_of(parent, first), apart = 0, other = 0;
+  for (size_t r = 0; r < w->full; r++) {
+    size_t node = w->node_of_row[r];
+    if (root_of(parent, node) == whole) continue;
+    if (!apart++) other = node;
+  }
+  free(parent);
+  if (!apart) return PB_OK;
+  return pb_fail(err, PB_ERR_SINGULAR, fem->name,
+                 "the part falls into pieces: node %" PRId64 " is not connected with node %" PRId64
+                 " (%zu of %zu rows are apart)",
+                 pb_fem_node_number(fem, other), pb_fem_node_number(fem, first), apart, w->full);
+}
+
+// ---- pins ---------------------------------------------------------------------------------------
+
+// The six rows whose motions are least alike, by Gram–Schmidt with pivoting on the rigid motions of
+// all rows: the 3-2-1 support, spread as far as the part reaches.
+static pb_status choose_pins(reduce_work *w, pb_error *err) {
+  const pb_fem *fem = w->fem;
+  double center[3] = {0}, size = 0;
+  double *motion = malloc(6 * w->full * sizeof *motion);
+  if (!motion) return pb_fail_memory(err, fem->name);
+  for (size_t r = 0; r < w->full; r++)
+    for (size_t a = 0; a < 3; a++)
+      center[a] += fem->xyz[a + 3 * w->node_of_row[r]] / (double)w->full;
+  for (size_t r = 0; r < w->full; r++)
+    for (size_t a = 0; a < 3; a++)
+      size = fmax(size, fabs(fem->xyz[a + 3 * w->node_of_row[r]] - center[a]));
+  for (size_t i = 0; i < 3 * fem->nodes; i++) {
+    double x[3], tie[18];
+    if (fem->dof[i] < 0) continue;
+    for (size_t a = 0; a < 3; a++)
+      x[a] = (fem->xyz[a + 3 * (i / 3)] - center[a]) / (size > 0 ? size : 1);
+    rigid_tie(x, tie);
+    for (size_t c = 0; c < 6; c++) motion[c + 6 * (size_t)fem->dof[i]] = tie[i % 3 + 3 * c];
+  }
+  pb_status st = PB_OK;
+  for (w->pins = 0; !st && w->pins < 6; w->pins++) {
+    size_t best = 0;
+    double largest = -1, unit[6];
+    for (size_t r = 0; r < w->full; r++) {
+      double sum = 0;
+      for (size_t c = 0; c < 6; c++) sum += motion[c + 6 * r] * motion[c + 6 * r];
+      if (sum > largest) largest = sum, best = r;
+    }
+    if (largest < 1e-12) {
+      st = pb_fail(err, PB_ERR_ARGUMENT, fem->name, "all nodes lie on a line or in one point");
+      break;
+    }
+    for (size_t c = 0; c < 6; c++) unit[c] = motion[c + 6 * best] / sqrt(largest);
+    for (size_t r = 0; r < w->full; r++) {
+      double along = 0;
+      for (size_t c = 0; c < 6; c++) along += unit[c] * motion[c + 6 * r];
+      for (size_t c = 0; c < 6; c++) motion[c + 6 * r] -= along * unit[c];
+    }
+    w->pin[w->pins] = best;
+    w->held[best] = true;
+  }
+  free(motion);
+  return st;
+}
+
+static pb_status list_pin_entries(reduce_work *w, pb_error *err) {
+  const pb_sparse *k = &w->fem->k;
+  size_t room = 0;
+  for (int pass = 0; pass < 2; pass++) {
+    size_t used = 0;
+    for (size_t j = 0; j < k->n; j++) {
+      for (int64_t at = k->start[j]; at < k->start[j + 1]; at++) {
+        size_t i = (size_t)k->row[at];
+        if (!w->held[i] && !w->held[j]) continue;
+        for (size_t p = 0; p < w->pins; p++) {
+          if (w->pin[p] != i && w->pin[p] != j) continue;
+          if (pass) w->pin_entry[used] = (pin_entry){w->pin[p] == j ? i : j, p, k->value[at]};
+          used++;
+        }
+      }
+    }
+    if (pass) break;
+    room = used;
+    w->pin_entry = malloc((room + 1) * sizeof *w->pin_entry);
+    if (!w->pin_entry) return pb_fail_memory(err, w->fem->name);
+    w->pin_entries = room;
+  }
+  return PB_OK;
+}
+
+pb_status reduce_set_up(reduce_work *w, pb_error *err) {
+  const pb_fem *fem = w->fem;
+  pb_status st = check_matrices(fem, err);
+  if (st) return st;
+  w->full = fem->k.n;
+  w->frames = fem->frames;
+  w->boundary = 6 * fem->frames;
+  st = map_rows(w, err);
+  if (!st) st = tie_frames(w, err);
+  if (!st) st = check_connected(w, err);
+  if (!st && w->averaged == w->frames) st = choose_pins(w, err);
+  if (!st) st = list_pin_entries(w, err);
+  if (st) return st;
+  w->border = w->pins;
+  for (size_t f = 0; f < w->frames; f++) {
+    if (w->frame[f].rigid) continue;
+    w->frame[f].border = w->border;
+    w->border += 6;
+  }
+  return reduce_mass_detect(w, err);
+}
