@@ -4,13 +4,14 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "assembly/eliminate.h"
 #include "assembly/stack.h"
 
 // rows × cols in the top left of a zeroed rows × cols array, plus more; a is replaced.
 static bool widen(double **a, size_t rows, size_t cols, size_t more_rows, size_t more_cols) {
   const size_t ld = rows + more_rows;
-  double *wide = calloc(ld * (cols + more_cols) + 1, sizeof *wide);
+  double *wide = pb_array_zero(ld * (cols + more_cols) + 1, sizeof *wide);
   if (!wide) return false;
   for (size_t j = 0; j < cols; j++) memcpy(wide + j * ld, *a + j * rows, rows * sizeof *wide);
   free(*a);
@@ -35,9 +36,9 @@ static pb_status extend(pb_stack_equations *s, pb_error *err) {
 
 static pb_status stack_keep(const pb_stack_equations *s, pb_system_stack *kept, pb_error *err) {
   const size_t bytes = s->n * s->n * sizeof(double), forces = s->n * s->nu * sizeof(double);
-  kept->m = malloc(bytes);
-  kept->k = malloc(bytes);
-  kept->f = malloc(forces);
+  kept->m = pb_array_new(1, bytes);
+  kept->k = pb_array_new(1, bytes);
+  kept->f = pb_array_new(1, forces);
   if (!kept->m || !kept->k || !kept->f) return pb_fail_memory(err, "/components");
   memcpy(kept->m, s->m, bytes);
   memcpy(kept->k, s->k, bytes);

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/lapack.h"
 #include "base/text.h"
 #include "model/block.h"
@@ -12,7 +13,7 @@
 static const double two_pi = 6.283185307179586476925286766559;
 
 static void *array(size_t count, size_t size) {
-  return calloc(count ? count : 1, size);
+  return pb_array_zero(count ? count : 1, size);
 }
 
 pb_model *pb_model_allocate(size_t nx, size_t nu, size_t ny, size_t modes, size_t blocks,
@@ -132,7 +133,7 @@ static pb_model_part part_of(const pb_model *m, size_t block) {
 static pb_status add_static(pb_model *m, const pb_model_part *p, pb_error *err) {
   size_t n = p->size;
   int size = (int)n, nu = (int)m->nu, info = 0;
-  double *a = malloc(n * n * sizeof *a), *x = malloc(n * m->nu * sizeof *x);
+  double *a = pb_array_new(n * n, sizeof *a), *x = pb_array_new(n * m->nu, sizeof *x);
   int *pivot = malloc(n * sizeof *pivot);
   pb_status st = PB_OK;
   if (!a || !x || !pivot) {
@@ -308,7 +309,7 @@ pb_status pb_model_discretize(pb_model *m, pb_error *err) {
     if (size > m->widest) m->widest = size;
     if (size == 2 && m->pairs == k) m->pairs++;
   }
-  double *gd = malloc((m->widest * m->widest + 1) * sizeof *gd);
+  double *gd = pb_array_new(m->widest * m->widest + 1, sizeof *gd);
   if (!gd) return pb_fail_memory(err, "");
   pb_status st = PB_OK;
   for (size_t k = 0; k < m->blocks && !st; k++) {

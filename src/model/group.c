@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/lapack.h"
 #include "model/block.h"
 #include "model/cluster.h"
@@ -32,10 +33,10 @@ static pb_status group_new(const pb_modes *m, const size_t *mode, size_t count, 
                            pb_error *err) {
   size_t n = 2 * count;
   *g = (group_system){.modes = count, .n = n, .mode = mode};
-  g->a = calloc(n * n, sizeof(double));
-  g->v = malloc(n * n * sizeof(double));
-  g->b = calloc(n * m->nu, sizeof(double));
-  g->c = calloc(n * m->ny, sizeof(double));
+  g->a = pb_array_zero(n * n, sizeof(double));
+  g->v = pb_array_new(n * n, sizeof(double));
+  g->b = pb_array_zero(n * m->nu, sizeof(double));
+  g->c = pb_array_zero(n * m->ny, sizeof(double));
   g->size = malloc(n * sizeof *g->size);
   if (g->a && g->v && g->b && g->c && g->size) return PB_OK;
   group_clear(g);
@@ -79,7 +80,7 @@ static pb_status group_diagonalize(const pb_modes *m, group_system *g, pb_error 
   if (st) return st;
   int n = (int)g->n, nu = (int)m->nu, ny = (int)m->ny, info = 0;
   double one = 1, zero = 0;
-  double *c = malloc(g->n * m->ny * sizeof *c);
+  double *c = pb_array_new(g->n * m->ny, sizeof *c);
   int *pivot = malloc(g->n * sizeof *pivot);
   if (!c || !pivot) {
     free(c);

@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/lapack.h"
 #include "model/damped.h"
 #include "model/group.h"
@@ -38,14 +39,14 @@ static pb_status shapes_new(shapes *s, pb_error *err) {
   const size_t n = s->d.n, columns = s->d.columns, nu = s->m->nu, ny = s->m->ny;
   bool ok = true;
   for (int i = 0; i < 2; i++) {
-    s->b[i] = malloc((columns * nu + 1) * sizeof(double));
-    s->c[i] = calloc(ny * columns + 1, sizeof(double));
-    s->w[i] = s->m->displacings ? malloc(n * columns * sizeof(double)) : NULL;
+    s->b[i] = pb_array_new(columns * nu + 1, sizeof(double));
+    s->c[i] = pb_array_zero(ny * columns + 1, sizeof(double));
+    s->w[i] = s->m->displacings ? pb_array_new(n * columns, sizeof(double)) : NULL;
     ok = ok && s->b[i] && s->c[i] && (s->w[i] || !s->m->displacings);
   }
   const size_t more = ny > nu ? ny : nu;
-  s->gather = malloc((n * more + 1) * sizeof(double));
-  s->product = malloc((ny * columns + 1) * sizeof(double));
+  s->gather = pb_array_new(n * more + 1, sizeof(double));
+  s->product = pb_array_new(ny * columns + 1, sizeof(double));
   ok = ok && s->gather && s->product;
   return ok ? PB_OK : pb_fail_memory(err, "");
 }
@@ -135,7 +136,8 @@ static void gram(const pb_damped *d, size_t c, double complex *b) {
 static pb_status scale_inputs(shapes *s, bool *done, pb_error *err) {
   const pb_clusters *c = &s->d.cluster;
   const size_t nu = s->m->nu, ld = s->d.columns, wide = 2 * c->widest;
-  double complex *b = malloc(wide * wide * sizeof *b), *x = malloc((wide * nu + 1) * sizeof *x);
+  double complex *b = pb_array_new(wide * wide, sizeof *b),
+                 *x = pb_array_new(wide * nu + 1, sizeof *x);
   int *pivot = malloc(wide * sizeof *pivot);
   const bool ok = b && x && pivot;
   for (size_t k = 0; k < c->count && ok && *done; k++) {
@@ -192,8 +194,8 @@ static pb_status emit_real(const shapes *s, size_t j, size_t k, double *b, doubl
 
 static pb_status emit(const shapes *s, pb_model_builder *builder, pb_error *err) {
   const pb_clusters *c = &s->d.cluster;
-  double *b = malloc((2 * s->m->nu + 1) * sizeof *b),
-         *out = malloc((2 * s->m->ny + 1) * sizeof *out);
+  double *b = pb_array_new(2 * s->m->nu + 1, sizeof *b),
+         *out = pb_array_new(2 * s->m->ny + 1, sizeof *out);
   pb_status st = b && out ? PB_OK : pb_fail_memory(err, "");
   size_t waiting = s->d.columns;  // a real eigenvalue without a partner yet
   for (size_t i = 0; i < c->count && !st; i++)
@@ -215,7 +217,8 @@ static pb_status emit(const shapes *s, pb_model_builder *builder, pb_error *err)
 
 static pb_status solve(shapes *s, size_t count, bool *done, pb_error *err) {
   const pb_modes *m = s->m;
-  double *omega = malloc(count * sizeof *omega), *damping = malloc(count * count * sizeof *damping);
+  double *omega = malloc(count * sizeof *omega),
+         *damping = pb_array_new(count * count, sizeof *damping);
   pb_status st = omega && damping ? PB_OK : pb_fail_memory(err, "");
   for (size_t j = 0; j < count && !st; j++) {
     omega[j] = m->omega[s->mode[j]];

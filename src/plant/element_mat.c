@@ -8,6 +8,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "base/array.h"
 #include "plant/element.h"
 
 typedef struct matrix {
@@ -78,7 +79,7 @@ static pb_status read_matrix(mat_t *mat, const char *file, const char *name, mat
   }
   out->rows = v->dims[0];
   out->cols = v->dims[1];
-  out->p = calloc(out->rows * out->cols, sizeof(double));
+  out->p = pb_array_zero(out->rows * out->cols, sizeof(double));
   if (!out->p) {
     st = pb_fail_memory(err, file);
     goto done;
@@ -155,7 +156,7 @@ pb_status pb_element_load(const char *path, pb_warnings *warnings, pb_element **
   if (!st) st = read_matrix(mat, path, "int_xyz", &xyz, err);
   if (!st) st = check_shapes(&k, &m, &xyz, path, err);
   if (st) goto done;
-  position = malloc(3 * xyz.rows * sizeof *position);
+  position = pb_array_new(3 * xyz.rows, sizeof *position);
   if (!position) {
     st = pb_fail_memory(err, path);
     goto done;
