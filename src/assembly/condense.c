@@ -146,6 +146,7 @@ static pb_status condensation_new(const pb_system *s, size_t nz, condensation *c
   c->nz = nz;
   c->na = s->n - nz;
   size_t wide = c->na > s->nu ? c->na : s->nu, tall = c->n > s->ny ? c->n : s->ny;
+  if (s->stacked > tall) tall = s->stacked;
   c->t = pb_array_new(c->n * c->na + 1, sizeof(double));
   c->kz = pb_array_new(c->n * nz, sizeof(double));
   c->kzz = pb_array_new(nz * nz, sizeof(double));
@@ -166,7 +167,7 @@ static void transform_output(const condensation *c, size_t ny, double *y) {
   memcpy(y, c->product, ny * c->na * sizeof *y);
 }
 
-// D += Y_0 Z K_zz⁻¹ Zᵀ F
+// D += Y_0 Z K_zz⁻¹ Zᵀ F, and expand_u alike.
 static void add_static(const condensation *c, pb_system *s) {
   const double *z = c->basis + c->na * c->n;
   multiply("T", c->nz, s->nu, c->n, z, c->n, s->f, c->n, c->x);
@@ -175,6 +176,8 @@ static void add_static(const condensation *c, pb_system *s) {
   int ny = (int)s->ny, nu = (int)s->nu, n = (int)c->n;
   double one = 1;
   dgemm_("N", "N", &ny, &nu, &n, &one, s->y0, &ny, c->product, &n, &one, s->d, &ny);
+  if (s->stacked)
+    multiply("N", s->stacked, s->nu, c->n, s->expand, s->stacked, c->product, c->n, s->expand_u);
 }
 
 static bool damps(const condensation *c, const pb_system *s) {
@@ -217,6 +220,7 @@ static pb_status condense(pb_system *s, condensation *c, const pb_null_basis *ba
   transform_output(c, s->ny, s->y0);
   transform_output(c, s->ny, s->y1);
   transform_output(c, s->ny, s->y2);
+  if (s->stacked) transform_output(c, s->stacked, s->expand);
   s->n = c->na;
   return PB_OK;
 }

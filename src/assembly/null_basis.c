@@ -216,6 +216,14 @@ pb_status pb_null_project(const pb_null_basis *b, pb_stack_equations *s, pb_syst
   return st;
 }
 
+pb_status pb_null_matrix(const pb_null_basis *b, double **out, pb_error *err) {
+  const size_t left = b->n - b->rank;
+  *out = pb_array_zero(b->n * left, sizeof **out);
+  if (!*out) return pb_fail_memory(err, "/connections");
+  for (size_t j = 0; j < left; j++) (*out)[b->rank + j + j * b->n] = 1;
+  return apply(b, "N", left, *out, err);
+}
+
 pb_status pb_null_expand(const pb_null_basis *b, const double *v, double *q, pb_error *err) {
   memset(q, 0, b->n * sizeof *q);
   memcpy(q + b->rank, v, (b->n - b->rank) * sizeof *q);

@@ -275,16 +275,17 @@ static void project(const pb_system *s, const double *shape, double *space, pb_m
   multiply("T", n, s->nu, n, shape, n, s->f, m->force);
   const double *y[3] = {s->y0, s->y1, s->y2};
   for (int i = 0; i < 3; i++) multiply("N", s->ny, n, n, y[i], s->ny, shape, m->output[i]);
+  multiply("N", s->stacked, n, n, s->expand, s->stacked, shape, m->motion);
 }
 
 static pb_status allocate(const pb_system *s, pb_modes *m, pb_error *err) {
   size_t n = s->n;
-  *m = (pb_modes){
-      .n = n, .nu = s->nu, .ny = s->ny, .displacing = s->displacing, .displacings = s->displacings};
+  *m = (pb_modes){.n = n, .nu = s->nu, .ny = s->ny, .stacked = s->stacked};
   m->omega = malloc(n * sizeof(double));
   m->damping = pb_array_new(n * n, sizeof(double));
   m->force = pb_array_new(n * s->nu, sizeof(double));
-  bool ok = m->omega && m->damping && m->force;
+  m->motion = s->stacked ? pb_array_new(s->stacked * n, sizeof(double)) : NULL;
+  bool ok = m->omega && m->damping && m->force && (m->motion || !s->stacked);
   for (int i = 0; i < 3; i++) {
     m->output[i] = pb_array_new(n * s->ny, sizeof(double));
     ok = ok && m->output[i];
@@ -317,6 +318,7 @@ void pb_modes_clear(pb_modes *m) {
   free(m->omega);
   free(m->damping);
   free(m->force);
+  free(m->motion);
   for (int i = 0; i < 3; i++) free(m->output[i]);
   *m = (pb_modes){0};
 }

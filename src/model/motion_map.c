@@ -51,7 +51,7 @@ static pb_status extended_compile(pb_plant *plant, pb_warnings *warnings, pb_mod
   pb_system *system = NULL;
   pb_model *extended = NULL;
   pb_system_stack stack = {0};
-  pb_status st = pb_system_assemble_extended(plant, warnings, &system, &stack, err);
+  pb_status st = pb_system_assemble_observed(plant, NULL, warnings, &system, &stack, err);
   map->layout = stack.layout;
   map->n = stack.layout.size;
   map->m = stack.m;
