@@ -79,6 +79,7 @@ typedef struct bench_machine {
 } bench_machine;
 
 void bench_machine_describe(bench_machine *machine);
+long bench_cores(void);  // online
 
 // Threads OpenBLAS uses from now on; nothing happens with another BLAS.
 void bench_blas_threads(int count);

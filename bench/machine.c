@@ -47,8 +47,12 @@ static double memory_bytes(void) {
   return (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
 }
 
+long bench_cores(void) {
+  return sysconf(_SC_NPROCESSORS_ONLN);
+}
+
 void bench_machine_describe(bench_machine *m) {
-  *m = (bench_machine){.cores = sysconf(_SC_NPROCESSORS_ONLN), .memory = memory_bytes()};
+  *m = (bench_machine){.cores = bench_cores(), .memory = memory_bytes()};
   read_cpu_name(m->cpu, sizeof m->cpu);
   read_features(m->features, sizeof m->features);
   append_cache(m->caches, sizeof m->caches, "L1d", sysconf(_SC_LEVEL1_DCACHE_SIZE));
