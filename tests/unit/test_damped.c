@@ -39,7 +39,8 @@ static double complex value(const double *const part[2], size_t at) {
   return part[0][at] + I * part[1][at];
 }
 
-// Largest entry of (λ² + λĈ + Ω²) x against ω_i |λ| |x|, over all eigenpairs; and P = Ĉ x.
+// Largest entry of (λ² + λĈ + Ω²) x, over all eigenpairs, against the larger of ω_i and |λ| and
+// the length of the vector as a state [ω x, λ x]; P = Ĉ x is held to the same.
 static double worst_residual(const problem *p, const pb_damped *d) {
   const size_t n = p->n;
   const double *const x[2] = {d->x[0], d->x[1]}, *const cx[2] = {d->p[0], d->p[1]};
@@ -47,7 +48,9 @@ static double worst_residual(const problem *p, const pb_damped *d) {
   for (size_t k = 0; k < d->columns; k++) {
     const double complex l = d->cluster.lambda[k];
     double length = 0;
-    for (size_t i = 0; i < n; i++) length = fmax(length, cabs(value(x, i + k * n)));
+    for (size_t i = 0; i < n; i++)
+      length =
+          hypot(length, hypot(p->omega[d->cluster.mode[i]], cabs(l)) * cabs(value(x, i + k * n)));
     for (size_t i = 0; i < n; i++) {
       const size_t mi = d->cluster.mode[i];
       double complex sum = 0;
@@ -55,9 +58,9 @@ static double worst_residual(const problem *p, const pb_damped *d) {
         sum += p->damping[mi + d->cluster.mode[j] * n] * value(x, j + k * n);
       const double complex r =
           (l * l + p->omega[mi] * p->omega[mi]) * value(x, i + k * n) + l * sum;
-      const double size = fmax(p->omega[mi], cabs(l)) * cabs(l) * length;
+      const double size = fmax(p->omega[mi], cabs(l)) * length;
       worst = fmax(worst, cabs(r) / size);
-      worst = fmax(worst, cabs(sum - value(cx, i + k * n)) / (p->omega[mi] * length));
+      worst = fmax(worst, cabs(l) * cabs(sum - value(cx, i + k * n)) / size);
     }
   }
   return worst;
