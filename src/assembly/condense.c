@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "assembly/eliminate.h"
+#include "base/array.h"
 #include "base/lapack.h"
 
 static const double massless = 1e-13;  // of the largest eigenvalue of the scaled mass matrix
@@ -26,8 +27,8 @@ static pb_status split(const pb_system *s, double *basis, size_t *count, pb_erro
   int n = (int)s->n, info = 0, lwork = 1 + 6 * n + 2 * n * n, liwork = 3 + 5 * n;
   size_t size = s->n;
   double *scale = malloc(size * sizeof *scale), *w = malloc(size * sizeof *w);
-  double *vector = malloc(size * size * sizeof *vector);
-  double *work = malloc((size_t)lwork * sizeof *work);
+  double *vector = pb_array_new(size * size, sizeof *vector);
+  double *work = pb_array_new((size_t)lwork, sizeof *work);
   int *iwork = malloc((size_t)liwork * sizeof *iwork);
   pb_status st = PB_OK;
   if (!scale || !w || !vector || !work || !iwork) {
@@ -81,7 +82,7 @@ static pb_status fail_singular(const pb_system *s, const pb_null_basis *basis,
                                const pb_layout *layout, const double *z, size_t nz, double *kzz,
                                pb_error *err) {
   int n = (int)nz, info = 0, lwork = 1 + 6 * n + 2 * n * n, liwork = 3 + 5 * n;
-  double *w = malloc(nz * sizeof *w), *work = malloc((size_t)lwork * sizeof *work);
+  double *w = malloc(nz * sizeof *w), *work = pb_array_new((size_t)lwork, sizeof *work);
   double *reduced = malloc(s->n * sizeof *reduced), *q = malloc(basis->n * sizeof *q);
   int *iwork = malloc((size_t)liwork * sizeof *iwork);
   const char *name = "/components";
@@ -145,11 +146,12 @@ static pb_status condensation_new(const pb_system *s, size_t nz, condensation *c
   c->nz = nz;
   c->na = s->n - nz;
   size_t wide = c->na > s->nu ? c->na : s->nu, tall = c->n > s->ny ? c->n : s->ny;
-  c->t = malloc((c->n * c->na + 1) * sizeof(double));
-  c->kz = malloc(c->n * nz * sizeof(double));
-  c->kzz = malloc(nz * nz * sizeof(double));
-  c->x = malloc((nz * wide + 1) * sizeof(double));
-  c->product = malloc((tall * wide + 1) * sizeof(double));
+  if (s->stacked > tall) tall = s->stacked;
+  c->t = pb_array_new(c->n * c->na + 1, sizeof(double));
+  c->kz = pb_array_new(c->n * nz, sizeof(double));
+  c->kzz = pb_array_new(nz * nz, sizeof(double));
+  c->x = pb_array_new(nz * wide + 1, sizeof(double));
+  c->product = pb_array_new(tall * wide + 1, sizeof(double));
   bool ok = c->t && c->kz && c->kzz && c->x && c->product;
   return ok ? PB_OK : pb_fail_memory(err, "/components");
 }
@@ -165,7 +167,7 @@ static void transform_output(const condensation *c, size_t ny, double *y) {
   memcpy(y, c->product, ny * c->na * sizeof *y);
 }
 
-// D += Y_0 Z K_zz⁻¹ Zᵀ F
+// D += Y_0 Z K_zz⁻¹ Zᵀ F, and expand_u alike.
 static void add_static(const condensation *c, pb_system *s) {
   const double *z = c->basis + c->na * c->n;
   multiply("T", c->nz, s->nu, c->n, z, c->n, s->f, c->n, c->x);
@@ -174,6 +176,8 @@ static void add_static(const condensation *c, pb_system *s) {
   int ny = (int)s->ny, nu = (int)s->nu, n = (int)c->n;
   double one = 1;
   dgemm_("N", "N", &ny, &nu, &n, &one, s->y0, &ny, c->product, &n, &one, s->d, &ny);
+  if (s->stacked)
+    multiply("N", s->stacked, s->nu, c->n, s->expand, s->stacked, c->product, c->n, s->expand_u);
 }
 
 static bool damps(const condensation *c, const pb_system *s) {
@@ -216,6 +220,7 @@ static pb_status condense(pb_system *s, condensation *c, const pb_null_basis *ba
   transform_output(c, s->ny, s->y0);
   transform_output(c, s->ny, s->y1);
   transform_output(c, s->ny, s->y2);
+  if (s->stacked) transform_output(c, s->stacked, s->expand);
   s->n = c->na;
   return PB_OK;
 }
@@ -225,7 +230,7 @@ static pb_status condense(pb_system *s, condensation *c, const pb_null_basis *ba
 static bool has_massless(const pb_system *s, bool *failed) {
   int n = (int)s->n, info = 0;
   size_t size = s->n;
-  double *a = malloc(size * size * sizeof *a);
+  double *a = pb_array_new(size * size, sizeof *a);
   *failed = !a;
   if (!a) return false;
   memcpy(a, s->m, size * size * sizeof *a);
@@ -245,7 +250,7 @@ pb_status pb_condense(pb_system *s, const pb_null_basis *basis, const pb_layout 
   if (!suspect) return PB_OK;
   condensation c = {0};
   size_t nz = 0;
-  c.basis = malloc(s->n * s->n * sizeof *c.basis);
+  c.basis = pb_array_new(s->n * s->n, sizeof *c.basis);
   if (!c.basis) return pb_fail_memory(err, "/components");
   pb_status st = split(s, c.basis, &nz, err);
   if (!st && nz) st = condensation_new(s, nz, &c, err);

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "assembly/eliminate.h"
+#include "base/array.h"
 #include "base/lapack.h"
 
 static pb_status factor(pb_null_basis *b, const pb_stack_equations *s, int *pivot, double *tau,
@@ -52,8 +53,8 @@ pb_status pb_null_build(const pb_stack_equations *s, pb_warnings *warnings, pb_n
   *out = (pb_null_basis){.n = s->n};
   const size_t m = s->constraints;
   if (!m) return PB_OK;
-  out->v = malloc(s->n * m * sizeof *out->v);
-  out->t = calloc(m * m, sizeof *out->t);
+  out->v = pb_array_new(s->n * m, sizeof *out->v);
+  out->t = pb_array_zero(m * m, sizeof *out->t);
   double *tau = malloc(m * sizeof *tau);
   int *pivot = malloc(m * sizeof *pivot);
   pb_status st = PB_OK;
@@ -113,7 +114,7 @@ static pb_status apply(const pb_null_basis *b, const char *transpose, size_t col
     for (size_t j = 0; j < r; j++) reflect(b, *transpose == 'T' ? j : r - 1 - j, cols, a);
     return PB_OK;
   }
-  double *w = malloc(2 * r * cols * sizeof *w), *tw = w + r * cols;
+  double *w = pb_array_new(2 * r * cols, sizeof *w), *tw = w + r * cols;
   if (!w) return pb_fail_memory(err, "/connections");
   multiply("T", "N", r, cols, n, 1, b->v, n, a, n, 0, w, r);
   multiply(transpose, "N", r, cols, r, 1, b->t, r, w, r, 0, tw, r);
@@ -126,7 +127,7 @@ static pb_status apply(const pb_null_basis *b, const char *transpose, size_t col
 static double *trailing(const double *a, size_t rows, size_t cols, size_t first_row,
                         size_t first_col) {
   size_t m = rows - first_row, n = cols - first_col;
-  double *out = malloc((m * n + 1) * sizeof *out);
+  double *out = pb_array_new(m * n + 1, sizeof *out);
   for (size_t j = 0; out && j < n; j++)
     memcpy(out + j * m, a + first_row + (first_col + j) * rows, m * sizeof *out);
   return out;
@@ -166,7 +167,7 @@ static pb_status project_square(const pb_null_basis *b, double *a, double **out,
     transpose(a, n);
     for (size_t j = 0; j < r; j++) reflect(b, j, n, a);
   } else {
-    z = malloc((2 * n + 2 * r) * r * sizeof *z);
+    z = pb_array_new((2 * n + 2 * r) * r, sizeof *z);
   }
   *out = trailing(a, n, n, r, r);
   if (!*out || (!z && !one_by_one(b))) {
@@ -189,7 +190,7 @@ static pb_status project_output(const pb_null_basis *b, double *yt, size_t ny, d
   pb_status st = apply(b, "T", ny, yt, err);
   if (st) return st;
   size_t n = b->n - b->rank;
-  *out = malloc((n * ny + 1) * sizeof **out);
+  *out = pb_array_new(n * ny + 1, sizeof **out);
   if (!*out) return pb_fail_memory(err, "/outputs");
   for (size_t o = 0; o < ny; o++)
     for (size_t i = 0; i < n; i++) (*out)[o + i * ny] = yt[b->rank + i + o * b->n];
@@ -213,6 +214,14 @@ pb_status pb_null_project(const pb_null_basis *b, pb_stack_equations *s, pb_syst
   sys->d = s->d;
   s->d = NULL;
   return st;
+}
+
+pb_status pb_null_matrix(const pb_null_basis *b, double **out, pb_error *err) {
+  const size_t left = b->n - b->rank;
+  *out = pb_array_zero(b->n * left, sizeof **out);
+  if (!*out) return pb_fail_memory(err, "/connections");
+  for (size_t j = 0; j < left; j++) (*out)[b->rank + j + j * b->n] = 1;
+  return apply(b, "N", left, *out, err);
 }
 
 pb_status pb_null_expand(const pb_null_basis *b, const double *v, double *q, pb_error *err) {

@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
+
 // a(n × n) += Σ weight[r] row_rᵀ row_r over the rows of a motion.
 static void add_rows(double *a, size_t n, const pb_motion *m, const double weight[6]) {
   for (int r = 0; r < 6; r++) {
@@ -102,7 +104,7 @@ static pb_status stack_element(pb_stack_equations *s, const pb_super_element *su
                                pb_error *err) {
   const pb_element *e = super->element;
   size_t m = e->size, n = s->n;
-  double *c = calloc(m * m, sizeof *c);
+  double *c = pb_array_zero(m * m, sizeof *c);
   if (!c) return pb_fail_memory(err, e->file);
   pb_status st =
       super->modal_damping > 0 ? pb_element_damping(e, super->modal_damping, c, err) : PB_OK;
@@ -238,14 +240,14 @@ static pb_status stack_connection(pb_stack_equations *s, const pb_plant *plant,
 
 static pb_status allocate(pb_stack_equations *s, pb_error *err) {
   size_t n = s->n;
-  s->m = calloc(n * n, sizeof(double));
-  s->c = calloc(n * n, sizeof(double));
-  s->k = calloc(n * n, sizeof(double));
-  s->f = calloc(n * s->nu, sizeof(double));
-  s->d = calloc(s->ny * s->nu, sizeof(double));
+  s->m = pb_array_zero(n * n, sizeof(double));
+  s->c = pb_array_zero(n * n, sizeof(double));
+  s->k = pb_array_zero(n * n, sizeof(double));
+  s->f = pb_array_zero(n * s->nu, sizeof(double));
+  s->d = pb_array_zero(s->ny * s->nu, sizeof(double));
   bool ok = s->m && s->c && s->k && s->f && s->d;
   for (int i = 0; i < 3; i++) {
-    s->y[i] = calloc(n * s->ny, sizeof(double));
+    s->y[i] = pb_array_zero(n * s->ny, sizeof(double));
     ok = ok && s->y[i];
   }
   return ok ? PB_OK : pb_fail_memory(err, "/components");

@@ -11,6 +11,7 @@
 
 #include <stddef.h>
 
+#include "base/phase.h"
 #include "base/status.h"
 #include "assembly/motion.h"
 #include "plant/plant.h"
@@ -22,9 +23,10 @@ typedef struct pb_system {
   double *y0, *y1, *y2;   // ny × n
   double *d;              // ny × nu
   const pb_plant *plant;  // names and rates; must outlive the system
-  // The inputs from `displacing` on, `displacings` of them, are displacements in the metric of M
-  // (f = M q sets η = Φᵀf at once) instead of forces; none in a plant as its file describes it.
-  size_t displacing, displacings;
+  // How the stacked coordinates follow, when that was asked for: q_stack = expand q + expand_u u.
+  size_t stacked;    // 0: not asked for
+  double *expand;    // stacked × n
+  double *expand_u;  // stacked × nu: what inputs hold statically (condensed motions)
   // The last `relaxations` inputs z and outputs e belong together: τ ż = e − z. None without
   // resistors across sensor stacks (assembly/stack_boundary.c).
   size_t relaxations;
@@ -47,11 +49,11 @@ typedef struct pb_system_stack {
 pb_status pb_system_assemble(const pb_plant *plant, pb_warnings *warnings, pb_system **out,
                              pb_error *err);
 
-// The same with each stacked coordinate as two more outputs (all q_i, then all q̇_i) and two more
-// inputs (a displacement of each, then an impulse on each), after the plant's own. *stack is the
-// caller's: layout (pb_layout_clear), m, k and f (free).
-// [init]
-pb_status pb_system_assemble_extended(const pb_plant *plant, pb_warnings *warnings, pb_system **out,
+// The same with what may be asked for besides; both may be NULL. *stack is the caller's: layout
+// (pb_layout_clear), m, k and f (free); with it the system tells how stacked coordinates follow.
+// The observer is told of the phases. [init]
+pb_status pb_system_assemble_observed(const pb_plant *plant, const pb_observer *observer,
+                                      pb_warnings *warnings, pb_system **out,
                                       pb_system_stack *stack, pb_error *err);
 
 void pb_system_free(pb_system *system);

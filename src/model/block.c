@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/lapack.h"
 
 // Largest entry of a Sylvester solution that still counts as well-conditioned.
@@ -43,7 +44,7 @@ static pb_status eigenvectors(size_t size, double *a, double *v, double *wr, dou
 static double condition(size_t size, const double *v, bool *failed) {
   int n = (int)size, info = 0;
   double rcond = 0, norm = 0;
-  double *lu = malloc(size * size * sizeof *lu), *work = malloc(4 * size * sizeof *work);
+  double *lu = pb_array_new(size * size, sizeof *lu), *work = pb_array_new(4 * size, sizeof *work);
   int *pivot = malloc(size * sizeof *pivot), *iwork = malloc(size * sizeof *iwork);
   *failed = !lu || !work || !pivot || !iwork;
   if (!*failed) {
@@ -172,7 +173,7 @@ static pb_status by_schur(size_t n, double *t, double *q, size_t *blocks, size_t
                           const char *context, pb_error *err) {
   pb_status st = schur_form(n, t, q, context, err);
   if (st) return st;
-  double *x = malloc(n * n * sizeof *x), *work = malloc(n * sizeof *work);
+  double *x = pb_array_new(n * n, sizeof *x), *work = malloc(n * sizeof *work);
   if (!x || !work) {
     st = pb_fail_memory(err, context);
     goto done;
@@ -198,7 +199,7 @@ pb_status pb_block_diagonalize(size_t n, double *a, double *v, size_t *blocks, s
                                const char *context, pb_error *err) {
   if (!pb_all_finite(a, n * n)) return fail_convergence(context, err);
   bool failed = false;
-  double *copy = malloc(n * n * sizeof *copy);
+  double *copy = pb_array_new(n * n, sizeof *copy);
   double *wr = malloc(n * sizeof *wr), *wi = malloc(n * sizeof *wi);
   pb_status st = PB_OK;
   if (!copy || !wr || !wi) {

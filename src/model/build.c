@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/lapack.h"
 #include "base/text.h"
 #include "model/block.h"
@@ -13,7 +14,7 @@
 static const double two_pi = 6.283185307179586476925286766559;
 
 static void *array(size_t count, size_t size) {
-  return calloc(count ? count : 1, size);
+  return pb_array_zero(count ? count : 1, size);
 }
 
 pb_model *pb_model_allocate(size_t nx, size_t nu, size_t ny, size_t modes, size_t blocks,
@@ -80,6 +81,7 @@ double pb_block_frequency(const double *a, size_t size) {
 pb_status pb_model_builder_open(pb_model_builder *b, size_t nx, size_t nu, size_t ny, size_t modes,
                                 pb_error *err) {
   b->capacity = 2 * nx;
+  b->plain = false;
   b->model = pb_model_allocate(nx, nu, ny, modes, nx, b->capacity);  // at most nx blocks
   if (!b->model) return pb_fail_memory(err, "");
   b->model->blocks = 0;
@@ -134,7 +136,7 @@ static pb_model_part part_of(const pb_model *m, size_t block) {
 static pb_status add_static(pb_model *m, const pb_model_part *p, pb_error *err) {
   size_t n = p->size;
   int size = (int)n, nu = (int)m->nu, info = 0;
-  double *a = malloc(n * n * sizeof *a), *x = malloc(n * m->nu * sizeof *x);
+  double *a = pb_array_new(n * n, sizeof *a), *x = pb_array_new(n * m->nu, sizeof *x);
   int *pivot = malloc(n * sizeof *pivot);
   pb_status st = PB_OK;
   if (!a || !x || !pivot) {
@@ -232,8 +234,15 @@ static pb_status check_finite(const pb_model *m, pb_error *err) {
   return PB_OK;
 }
 
+// What stepping needs besides.
+static pb_status make_steps(pb_model *m, pb_error *err) {
+  pb_status st = pb_model_discretize(m, err);
+  if (!st) st = check_finite(m, err);
+  return st ? st : pb_step_pack_model(m, err);
+}
+
 // The blocks of m in order, those above hz (0: none) gone into d.
-static pb_status rebuild(const pb_model *m, double hz, pb_model **out, pb_error *err) {
+static pb_status rebuild(const pb_model *m, double hz, bool steps, pb_model **out, pb_error *err) {
   double limit = hz > 0 ? two_pi * hz : INFINITY;
   size_t kept = 0, nx = 0, values = 0;
   rank *order = malloc((m->blocks + 1) * sizeof *order);
@@ -259,9 +268,7 @@ static pb_status rebuild(const pb_model *m, double hz, pb_model **out, pb_error 
     else
       append(copy, &p);
   }
-  if (!st) st = pb_model_discretize(copy, err);
-  if (!st) st = check_finite(copy, err);
-  if (!st) st = pb_step_pack_model(copy, err);
+  if (!st && steps) st = make_steps(copy, err);
   free(order);
   if (st) {
     pb_model_free(copy);
@@ -279,20 +286,16 @@ pb_status pb_model_narrow(const pb_model *m, size_t nu, size_t ny, pb_model **ou
   n->sample_rate = m->sample_rate;
   n->max_frequency = m->max_frequency;
   n->dof = m->dof;
-  n->pairs = m->pairs;
-  n->widest = m->widest;
   memcpy(n->mode_hz, m->mode_hz, m->modes * sizeof(double));
   memcpy(n->mode_damping, m->mode_damping, m->modes * sizeof(double));
   memcpy(n->block_start, m->block_start, (m->blocks + 1) * sizeof(size_t));
   memcpy(n->block_value, m->block_value, (m->blocks + 1) * sizeof(size_t));
   memcpy(n->a, m->a, values * sizeof(double));
-  memcpy(n->ad, m->ad, values * sizeof(double));
   memcpy(n->b, m->b, m->nx * nu * sizeof(double));
-  memcpy(n->bd, m->bd, m->nx * nu * sizeof(double));
   for (size_t j = 0; j < m->nx; j++) memcpy(n->c + j * ny, m->c + j * m->ny, ny * sizeof(double));
   for (size_t i = 0; i < nu; i++) memcpy(n->d + i * ny, m->d + i * m->ny, ny * sizeof(double));
   pb_status st = copy_signals(m, n, err);
-  if (!st) st = pb_step_pack_model(n, err);
+  if (!st) st = make_steps(n, err);
   if (st)
     pb_model_free(n);
   else
@@ -302,7 +305,7 @@ pb_status pb_model_narrow(const pb_model *m, size_t nu, size_t ny, pb_model **ou
 
 pb_status pb_model_builder_close(pb_model_builder *b, double max_frequency, pb_model **out,
                                  pb_error *err) {
-  pb_status st = rebuild(b->model, max_frequency, out, err);
+  pb_status st = rebuild(b->model, max_frequency, !b->plain, out, err);
   pb_model_builder_discard(b);
   return st;
 }
@@ -310,7 +313,7 @@ pb_status pb_model_builder_close(pb_model_builder *b, double max_frequency, pb_m
 pb_status pb_model_truncate(const pb_model *model, double hz, pb_model **out, pb_error *err) {
   *out = NULL;
   if (!(hz > 0)) return pb_fail(err, PB_ERR_ARGUMENT, "max_frequency", "expected a number > 0");
-  return rebuild(model, hz, out, err);
+  return rebuild(model, hz, true, out, err);
 }
 
 pb_status pb_model_discretize(pb_model *m, pb_error *err) {
@@ -320,7 +323,7 @@ pb_status pb_model_discretize(pb_model *m, pb_error *err) {
     if (size > m->widest) m->widest = size;
     if (size == 2 && m->pairs == k) m->pairs++;
   }
-  double *gd = malloc((m->widest * m->widest + 1) * sizeof *gd);
+  double *gd = pb_array_new(m->widest * m->widest + 1, sizeof *gd);
   if (!gd) return pb_fail_memory(err, "");
   pb_status st = PB_OK;
   for (size_t k = 0; k < m->blocks && !st; k++) {

@@ -7,6 +7,7 @@
 typedef struct pb_model_builder {
   pb_model *model;  // blocks in the order in which they came, not discretised
   size_t capacity;  // of model->a
+  bool plain;       // the model is to be narrowed, not to be stepped: not discretised
 } pb_model_builder;
 
 // One diagonal block: a size × size (leading dimension lda), b size × nu (ldb), c ny × size (ldc).
@@ -24,7 +25,8 @@ pb_status pb_model_builder_open(pb_model_builder *builder, size_t nx, size_t nu,
 pb_status pb_model_builder_add(pb_model_builder *builder, const pb_model_part *part, pb_error *err);
 
 // Sorts the blocks by natural frequency, 2 × 2 blocks first; replaces those above max_frequency
-// (Hz; 0: none) by their static contribution; discretises. The builder is empty afterwards.
+// (Hz; 0: none) by their static contribution; discretises unless it is plain. The builder is empty
+// afterwards.
 pb_status pb_model_builder_close(pb_model_builder *builder, double max_frequency, pb_model **out,
                                  pb_error *err);
 
@@ -40,7 +42,7 @@ void pb_model_builder_discard(pb_model_builder *builder);
 pb_model *pb_model_allocate(size_t nx, size_t nu, size_t ny, size_t modes, size_t blocks,
                             size_t values);
 
-// A copy with the first nu inputs and the first ny outputs only.
+// A copy with the first nu inputs and the first ny outputs only, discretised.
 pb_status pb_model_narrow(const pb_model *model, size_t nu, size_t ny, pb_model **out,
                           pb_error *err);
 

@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/lapack.h"
 
 static const double strong = 1e-2;  // tilt above which two modes are solved together
@@ -89,7 +90,7 @@ static pb_status group_modes(const double *omega, const double *damping, pb_clus
                              pb_error *err) {
   size_t n = out->n;
   size_t *parent = malloc(n * sizeof *parent), *number = malloc(n * sizeof *number);
-  double complex *lambda = malloc(2 * n * sizeof *lambda);
+  double complex *lambda = pb_array_new(2 * n, sizeof *lambda);
   bool ok = parent && number && lambda;
   for (size_t i = 0; i < n && ok; i++) {
     parent[i] = i;
@@ -144,9 +145,9 @@ static void work_clear(work *w) {
 static bool work_new(size_t modes, work *w) {
   size_t n = 2 * modes;
   *w = (work){.length = (int)(64 * n)};
-  w->a = malloc(n * n * sizeof(double));
-  w->vectors = malloc(n * n * sizeof(double));
-  w->inverse = malloc(n * n * sizeof(double));
+  w->a = pb_array_new(n * n, sizeof(double));
+  w->vectors = pb_array_new(n * n, sizeof(double));
+  w->inverse = pb_array_new(n * n, sizeof(double));
   w->wr = malloc(n * sizeof(double));
   w->wi = malloc(n * sizeof(double));
   w->real = malloc((size_t)w->length * sizeof(double));
@@ -223,7 +224,7 @@ static pb_status allocate(pb_clusters *out, pb_error *err) {
   }
   out->column = calloc(out->count + 1, sizeof *out->column);
   out->pairs = calloc(out->count + 1, sizeof *out->pairs);
-  out->lambda = malloc(2 * n * sizeof *out->lambda);
+  out->lambda = pb_array_new(2 * n, sizeof *out->lambda);
   out->v = malloc(values * sizeof *out->v);
   out->y = malloc(values * sizeof *out->y);
   bool ok = out->column && out->pairs && out->lambda && out->v && out->y;

@@ -72,7 +72,7 @@ done:
   return st;
 }
 
-// Those beyond the plant's own, of an extended system, have no name.
+// Those beyond the plant's own, of stacked coordinates that are followed, have no name.
 static pb_status copy_signals(const pb_port *port, size_t ports, size_t count, pb_signal *out,
                               pb_error *err) {
   for (size_t i = 0; i < count; i++) {
@@ -84,11 +84,17 @@ static pb_status copy_signals(const pb_port *port, size_t ports, size_t count, p
 }
 
 // Direct feed-through: D of the system and, of accelerations, Y_2 Φ Φᵀ F.
-static void fill_feedthrough(const pb_system *s, const pb_modes *m, double *d) {
-  int ny = (int)m->ny, nu = (int)m->nu, n = (int)m->n;
+// ld: rows of d. Stacked coordinates that are followed have what inputs hold of them statically.
+static void fill_feedthrough(const pb_system *s, const pb_modes *m, double *d, size_t ld) {
+  int ny = (int)m->ny, nu = (int)m->nu, n = (int)m->n, rows = (int)ld;
   double one = 1;
-  memcpy(d, s->d, m->ny * m->nu * sizeof *d);
-  dgemm_("N", "N", &ny, &nu, &n, &one, m->output[2], &ny, m->force, &n, &one, d, &ny);
+  for (size_t i = 0; i < m->nu; i++) {
+    memcpy(d + i * ld, s->d + i * m->ny, m->ny * sizeof *d);
+    if (m->stacked)
+      memcpy(d + m->ny + i * ld, s->expand_u + i * m->stacked, m->stacked * sizeof *d);
+  }
+  if (ny && nu)
+    dgemm_("N", "N", &ny, &nu, &n, &one, m->output[2], &ny, m->force, &n, &one, d, &rows);
 }
 
 // The electronics of one list of ports, the caller's; NULL where no port has any.
@@ -107,10 +113,10 @@ static pb_status list_electronics(const pb_port *port, size_t ports, size_t coun
 static pb_status fill_signals(const pb_system *s, pb_model *model, pb_error *err) {
   const pb_plant *p = s->plant;
   const size_t nu = p->input_count, ny = p->output_count;
-  pb_status st = copy_signals(p->input, nu, s->nu, model->input, err);
-  if (!st) st = copy_signals(p->output, ny, s->ny, model->output, err);
-  if (!st) st = list_electronics(p->input, nu, s->nu, &model->input_electronics, err);
-  if (!st) st = list_electronics(p->output, ny, s->ny, &model->output_electronics, err);
+  pb_status st = copy_signals(p->input, nu, model->nu, model->input, err);
+  if (!st) st = copy_signals(p->output, ny, model->ny, model->output, err);
+  if (!st) st = list_electronics(p->input, nu, model->nu, &model->input_electronics, err);
+  if (!st) st = list_electronics(p->output, ny, model->ny, &model->output_electronics, err);
   return st;
 }
 
@@ -125,36 +131,52 @@ static pb_status fill_header(const pb_system *s, const pb_modes *m, pb_model *mo
     model->mode_hz[j] = m->omega[j] / two_pi;
     model->mode_damping[j] = m->omega[j] > 0 ? m->damping[j + j * m->n] / (2 * m->omega[j]) : 0;
   }
-  fill_feedthrough(s, m, model->d);
+  fill_feedthrough(s, m, model->d, model->ny);
   return fill_signals(s, model, err);
 }
 
-pb_status pb_model_compile(const pb_system *s, pb_warnings *warnings, pb_model **out,
-                           pb_error *err) {
+pb_status pb_model_compile_observed(const pb_system *s, const pb_observer *observer,
+                                    pb_warnings *warnings, pb_model **out, pb_error *err) {
   *out = NULL;
   pb_modes modes = {0};
   pb_model_builder builder = {0};
+  const size_t nu = s->nu + 2 * s->stacked, ny = s->ny + 2 * s->stacked;
+  pb_phase_begin(observer, PB_PHASE_MODES);
   pb_status st = pb_modes_solve(s, warnings, &modes, err);
-  if (!st) st = pb_model_builder_open(&builder, 2 * s->n, s->nu, s->ny, s->n, err);
+  pb_phase_begin(observer, PB_PHASE_DAMP);
+  if (!st) st = pb_model_builder_open(&builder, 2 * s->n, nu, ny, s->n, err);
+  builder.plain = s->stacked > 0;
   if (!st) st = fill_header(s, &modes, builder.model, err);
   if (!st) st = build_groups(&modes, &builder, err);
+  pb_modes_clear(&modes);
+  pb_phase_begin(observer, PB_PHASE_DISCRETIZE);
   if (!st && s->relaxations == 0)
     st = pb_model_builder_close(&builder, s->plant->max_frequency, out, err);
   else if (!st)
     st = pb_model_relax(s, &builder, out, err);
   pb_model_builder_discard(&builder);
-  pb_modes_clear(&modes);
+  return st;
+}
+
+pb_status pb_model_compile(const pb_system *s, pb_warnings *warnings, pb_model **out,
+                           pb_error *err) {
+  return pb_model_compile_observed(s, NULL, warnings, out, err);
+}
+
+pb_status pb_model_load_observed(const char *path, const pb_observer *observer,
+                                 pb_warnings *warnings, pb_model **out, pb_error *err) {
+  *out = NULL;
+  pb_plant *plant = NULL;
+  pb_system *system = NULL;
+  pb_phase_begin(observer, PB_PHASE_READ);
+  pb_status st = pb_plant_load(path, warnings, &plant, err);
+  if (!st) st = pb_system_assemble_observed(plant, observer, warnings, &system, NULL, err);
+  if (!st) st = pb_model_compile_observed(system, observer, warnings, out, err);
+  pb_system_free(system);
+  pb_plant_free(plant);
   return st;
 }
 
 pb_status pb_model_load(const char *path, pb_warnings *warnings, pb_model **out, pb_error *err) {
-  *out = NULL;
-  pb_plant *plant = NULL;
-  pb_system *system = NULL;
-  pb_status st = pb_plant_load(path, warnings, &plant, err);
-  if (!st) st = pb_system_assemble(plant, warnings, &system, err);
-  if (!st) st = pb_model_compile(system, warnings, out, err);
-  pb_system_free(system);
-  pb_plant_free(plant);
-  return st;
+  return pb_model_load_observed(path, NULL, warnings, out, err);
 }

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/lapack.h"
 #include "model/damped_internal.h"
 
@@ -48,8 +49,8 @@ static void iteration_clear(pb_iteration *it) {
 static bool result_new(pb_damped *d) {
   bool ok = true;
   for (int i = 0; i < 2; i++) {
-    d->x[i] = calloc(d->n * d->columns, sizeof(double));
-    d->p[i] = malloc(d->n * d->columns * sizeof(double));
+    d->x[i] = pb_array_zero(d->n * d->columns, sizeof(double));
+    d->p[i] = pb_array_new(d->n * d->columns, sizeof(double));
     ok = ok && d->x[i] && d->p[i];
   }
   return ok;
@@ -60,25 +61,25 @@ static bool iteration_new(pb_damped *d, pb_iteration *it) {
   *it = (pb_iteration){.d = d, .widest = wide};
   bool ok = true;
   for (int i = 0; i < 2; i++) {
-    it->r[i] = malloc(n * BATCH * sizeof(double));
-    it->dx[i] = malloc(n * BATCH * sizeof(double));
-    it->along[i] = malloc(2 * BATCH * wide * sizeof(double));
+    it->r[i] = pb_array_new(n * BATCH, sizeof(double));
+    it->dx[i] = pb_array_new(n * BATCH, sizeof(double));
+    it->along[i] = pb_array_new(2 * BATCH * wide, sizeof(double));
     ok = ok && it->r[i] && it->dx[i] && it->along[i];
   }
-  it->c = malloc(n * n * sizeof(double));
+  it->c = pb_array_new(n * n, sizeof(double));
   it->w2 = malloc(n * sizeof(double));
-  it->in = malloc(n * BATCH * sizeof(double));
-  it->out = malloc(n * BATCH * sizeof(double));
-  it->basis = malloc(2 * wide * wide * sizeof(double));
+  it->in = pb_array_new(n * BATCH, sizeof(double));
+  it->out = pb_array_new(n * BATCH, sizeof(double));
+  it->basis = pb_array_new(2 * wide * wide, sizeof(double));
   it->active = malloc(count * sizeof(bool));
   it->error = malloc(count * sizeof(double));
   it->home = malloc(d->columns * sizeof *it->home);
   it->value = malloc((count + 1) * sizeof *it->value);
-  it->t = malloc(wide * wide * sizeof *it->t);
-  it->z = malloc(wide * wide * sizeof *it->z);
-  it->work = malloc(4 * wide * sizeof *it->work);
-  it->rwork = malloc(2 * wide * sizeof(double));
-  it->turned = malloc(2 * n * wide * sizeof(double));
+  it->t = pb_array_new(wide * wide, sizeof *it->t);
+  it->z = pb_array_new(wide * wide, sizeof *it->z);
+  it->work = pb_array_new(4 * wide, sizeof *it->work);
+  it->rwork = pb_array_new(2 * wide, sizeof(double));
+  it->turned = pb_array_new(2 * n * wide, sizeof(double));
   it->pivot = malloc(wide * sizeof(int));
   ok = ok && it->c && it->w2 && it->basis && it->in && it->out && it->active && it->error &&
        it->home && it->value && it->t && it->z && it->work && it->rwork && it->turned && it->pivot;

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/lapack.h"
 #include "model/block.h"
 
@@ -97,7 +98,7 @@ pb_status pb_block_discretize(size_t n, const double *a, double h, double *ad, d
                               pb_error *err) {
   if (n == 2 && pair(a, h, ad, gd)) return PB_OK;
   size_t m = 2 * n;
-  double *x = calloc(8 * m * m, sizeof *x);
+  double *x = pb_array_zero(8 * m * m, sizeof *x);
   int *pivot = malloc(m * sizeof *pivot);
   pb_status st = PB_OK;
   if (!x || !pivot) {

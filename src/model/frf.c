@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "base/lapack.h"
+#include "model/frf_pairs.h"
 #include "model/model.h"
 
 static const double two_pi = 6.283185307179586476925286766559;
@@ -96,11 +97,9 @@ static void add_electronics(const pb_model *m, pb_time_base base, double complex
   }
 }
 
-// `work` and `pivot` serve the blocks above 2 × 2 and may be NULL without such blocks.
-static void evaluate(const pb_model *m, pb_time_base base, double complex p, double complex *h,
-                     double complex *dh, double complex *work, int *pivot) {
-  basis at = choose(m, base);
-  bool sampled = base != PB_CONTINUOUS;
+// h = D or D z⁻¹.
+static void begin(const pb_model *m, bool sampled, double complex p, double complex *h,
+                  double complex *dh) {
   double complex through = sampled ? 1 / p : 1;
   for (size_t o = 0; o < m->ny; o++) {
     for (size_t i = 0; i < m->nu; i++) {
@@ -108,6 +107,20 @@ static void evaluate(const pb_model *m, pb_time_base base, double complex p, dou
       if (dh) dh[o * m->nu + i] = sampled ? -m->d[o + i * m->ny] / (p * p) : 0;
     }
   }
+}
+
+// `work` and `pivot` serve the blocks above 2 × 2 and may be NULL without such blocks.
+static void finish(const pb_model *m, pb_time_base base, double complex p, double complex *h,
+                   double complex *dh, double complex *work, int *pivot) {
+  basis at = choose(m, base);
+  for (size_t k = m->pairs; k < m->blocks; k++) add_block(m, &at, k, p, h, dh, work, pivot);
+  if (m->input_electronics || m->output_electronics) add_electronics(m, base, p, h, dh);
+}
+
+static void evaluate(const pb_model *m, pb_time_base base, double complex p, double complex *h,
+                     double complex *dh, double complex *work, int *pivot) {
+  basis at = choose(m, base);
+  begin(m, base != PB_CONTINUOUS, p, h, dh);
   for (size_t k = 0; k < m->pairs; k++) {
     double complex r[4];
     size_t start = m->block_start[k];
@@ -118,8 +131,7 @@ static void evaluate(const pb_model *m, pb_time_base base, double complex p, dou
       add_pair(m, start, r, b[0], b[1], h, dh, i);
     }
   }
-  for (size_t k = m->pairs; k < m->blocks; k++) add_block(m, &at, k, p, h, dh, work, pivot);
-  if (m->input_electronics || m->output_electronics) add_electronics(m, base, p, h, dh);
+  finish(m, base, p, h, dh, work, pivot);
 }
 
 // Scratch of `evaluate` for models with blocks above 2 × 2.
@@ -148,6 +160,44 @@ void pb_model_evaluate(const pb_model *m, pb_time_base base, double complex poin
   free(pivot);
 }
 
+// e^{iθ} − 1, exact to the last digits at small θ.
+static double complex turn(double theta) {
+  double half = sin(0.5 * theta);
+  return -2 * half * half + I * sin(theta);
+}
+
+static bool all_finite(const double complex *h, size_t count) {
+  for (size_t i = 0; i < count; i++)
+    if (!isfinite(creal(h[i])) || !isfinite(cimag(h[i]))) return false;
+  return true;
+}
+
+// Many points at once; at a pole, where one block's infinity would spread to every entry, again by
+// itself.
+static pb_status respond(const pb_model *m, pb_time_base base, const double *hz, size_t nf,
+                         double complex *h, double complex *work, int *pivot, pb_error *err) {
+  const basis at = choose(m, base);
+  const bool sampled = base != PB_CONTINUOUS;
+  const size_t entries = m->ny * m->nu;
+  double complex *q = malloc((nf + 1) * sizeof *q);
+  if (!q) return pb_fail_memory(err, "");
+  for (size_t f = 0; f < nf; f++) {
+    const double w = two_pi * hz[f];
+    q[f] = sampled ? turn(w / m->sample_rate) : I * w;
+    begin(m, sampled, sampled ? 1 + q[f] : q[f], h + f * entries, NULL);
+  }
+  pb_status st = pb_pairs_response(m, at.a, at.b, sampled ? 1 : 0, q, nf, h, err);
+  for (size_t f = 0; f < nf && !st; f++) {
+    const double complex p = sampled ? 1 + q[f] : q[f];
+    if (all_finite(h + f * entries, entries))
+      finish(m, base, p, h + f * entries, NULL, work, pivot);
+    else
+      evaluate(m, base, p, h + f * entries, NULL, work, pivot);
+  }
+  free(q);
+  return st;
+}
+
 pb_status pb_model_frf(const pb_model *m, pb_time_base base, const double *hz, size_t nf,
                        double complex *h, pb_error *err) {
   for (size_t f = 0; f < nf; f++)
@@ -156,11 +206,7 @@ pb_status pb_model_frf(const pb_model *m, pb_time_base base, const double *hz, s
   double complex *work;
   int *pivot;
   pb_status st = scratch_new(m, &work, &pivot) ? PB_OK : pb_fail_memory(err, "");
-  for (size_t f = 0; f < nf && !st; f++) {
-    double w = two_pi * hz[f];
-    double complex p = base == PB_CONTINUOUS ? I * w : cexp(I * w / m->sample_rate);
-    evaluate(m, base, p, h + f * m->ny * m->nu, NULL, work, pivot);
-  }
+  if (!st) st = respond(m, base, hz, nf, h, work, pivot, err);
   free(work);
   free(pivot);
   return st;

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/lapack.h"
 #include "model/block.h"
 #include "model/cluster.h"
@@ -14,6 +15,7 @@ typedef struct group_system {
   size_t modes, n;     // g, 2g
   const size_t *mode;  // [g]
   double *a, *v;       // n × n
+  size_t nu, ny;       // with those of stacked coordinates
   double *b;           // n × nu
   double *c;           // ny × n
   size_t *size;        // [n] block sizes
@@ -31,45 +33,58 @@ static void group_clear(group_system *g) {
 static pb_status group_new(const pb_modes *m, const size_t *mode, size_t count, group_system *g,
                            pb_error *err) {
   size_t n = 2 * count;
-  *g = (group_system){.modes = count, .n = n, .mode = mode};
-  g->a = calloc(n * n, sizeof(double));
-  g->v = malloc(n * n * sizeof(double));
-  g->b = calloc(n * m->nu, sizeof(double));
-  g->c = calloc(n * m->ny, sizeof(double));
+  *g = (group_system){.modes = count,
+                      .n = n,
+                      .mode = mode,
+                      .nu = m->nu + 2 * m->stacked,
+                      .ny = m->ny + 2 * m->stacked};
+  g->a = pb_array_zero(n * n, sizeof(double));
+  g->v = pb_array_new(n * n, sizeof(double));
+  g->b = pb_array_zero(n * g->nu, sizeof(double));
+  g->c = pb_array_zero(n * g->ny, sizeof(double));
   g->size = malloc(n * sizeof *g->size);
   if (g->a && g->v && g->b && g->c && g->size) return PB_OK;
   group_clear(g);
   return pb_fail_memory(err, "");
 }
 
+// Outputs q and q̇, a displacement and an impulse, of each stacked coordinate.
+static void fill_motion(const pb_modes *m, group_system *g, size_t mode, double s, size_t x) {
+  const double *motion = m->motion + mode * m->stacked;
+  for (size_t r = 0; r < m->stacked; r++) {
+    g->c[m->ny + r + x * g->ny] = motion[r] / s;
+    g->c[m->ny + m->stacked + r + (x + 1) * g->ny] = motion[r];
+    g->b[x + (m->nu + r) * g->n] = motion[r] * s;
+    g->b[x + 1 + (m->nu + m->stacked + r) * g->n] = motion[r];
+  }
+}
+
 // States are laid out mode by mode, the fastest first: on a matrix graded so, the QR algorithm
 // finds the small eigenvalues to an accuracy of their own instead of that of the largest.
 static void group_fill(const pb_modes *m, group_system *g) {
-  size_t count = g->modes, n = g->n, ny = m->ny;
+  size_t count = g->modes, n = g->n, ny = m->ny, ld = g->ny;
   for (size_t j = 0; j < count; j++) {
     size_t mode = g->mode[j], x = 2 * (count - 1 - j), v = x + 1;
     double s = pb_mode_scale(m->omega[mode]), w2 = m->omega[mode] * m->omega[mode];
     g->a[x + v * n] = s;
     g->a[v + x * n] = -w2 / s;
-    for (size_t i = 0; i < m->nu; i++) {
-      const bool displaces = i - m->displacing < m->displacings;
-      g->b[(displaces ? x : v) + i * n] = (displaces ? s : 1) * m->force[mode + i * m->n];
-    }
+    for (size_t i = 0; i < m->nu; i++) g->b[v + i * n] = m->force[mode + i * m->n];
+    if (m->stacked) fill_motion(m, g, mode, s, x);
     for (size_t i = 0; i < count; i++)
       g->a[2 * (count - 1 - i) + 1 + v * n] = -m->damping[g->mode[i] + mode * m->n];
     for (size_t o = 0; o < ny; o++) {
       double acceleration = m->output[2][o + mode * ny];
-      g->c[o + x * ny] = (m->output[0][o + mode * ny] - acceleration * w2) / s;
-      g->c[o + v * ny] = m->output[1][o + mode * ny];
+      g->c[o + x * ld] = (m->output[0][o + mode * ny] - acceleration * w2) / s;
+      g->c[o + v * ld] = m->output[1][o + mode * ny];
       for (size_t i = 0; i < count; i++)
-        g->c[o + v * ny] -=
+        g->c[o + v * ld] -=
             m->output[2][o + g->mode[i] * ny] * m->damping[g->mode[i] + mode * m->n];
     }
   }
 }
 
 // b ← V⁻¹ b, c ← c V, a ← diag(blocks).
-static pb_status group_diagonalize(const pb_modes *m, group_system *g, pb_error *err) {
+static pb_status group_diagonalize(group_system *g, pb_error *err) {
   if (g->modes == 1) {
     g->blocks = 1;
     g->size[0] = 2;
@@ -77,9 +92,9 @@ static pb_status group_diagonalize(const pb_modes *m, group_system *g, pb_error 
   }
   pb_status st = pb_block_diagonalize(g->n, g->a, g->v, &g->blocks, g->size, "", err);
   if (st) return st;
-  int n = (int)g->n, nu = (int)m->nu, ny = (int)m->ny, info = 0;
+  int n = (int)g->n, nu = (int)g->nu, ny = (int)g->ny, info = 0;
   double one = 1, zero = 0;
-  double *c = malloc(g->n * m->ny * sizeof *c);
+  double *c = pb_array_new(g->n * g->ny, sizeof *c);
   int *pivot = malloc(g->n * sizeof *pivot);
   if (!c || !pivot) {
     free(c);
@@ -96,8 +111,7 @@ static pb_status group_diagonalize(const pb_modes *m, group_system *g, pb_error 
 }
 
 // Hands the group's blocks over; a real eigenvalue shares a 2 × 2 block with the next one.
-static pb_status group_emit(const pb_modes *m, const group_system *g, pb_model_builder *builder,
-                            pb_error *err) {
+static pb_status group_emit(const group_system *g, pb_model_builder *builder, pb_error *err) {
   pb_status st = PB_OK;
   size_t at = 0;
   for (size_t k = 0; k < g->blocks && !st; k++) {
@@ -108,8 +122,8 @@ static pb_status group_emit(const pb_modes *m, const group_system *g, pb_model_b
                           .lda = g->n,
                           .b = g->b + at,
                           .ldb = g->n,
-                          .c = g->c + at * m->ny,
-                          .ldc = m->ny};
+                          .c = g->c + at * g->ny,
+                          .ldc = g->ny};
     st = pb_model_builder_add(builder, &part, err);
     at += size;
   }
@@ -122,8 +136,8 @@ static pb_status build_dense(const pb_modes *m, const size_t *mode, size_t count
   pb_status st = group_new(m, mode, count, &g, err);
   if (st) return st;
   group_fill(m, &g);
-  st = group_diagonalize(m, &g, err);
-  if (!st) st = group_emit(m, &g, builder, err);
+  st = group_diagonalize(&g, err);
+  if (!st) st = group_emit(&g, builder, err);
   group_clear(&g);
   return st;
 }

@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/lapack.h"
 #include "model/damped.h"
 #include "model/group.h"
@@ -17,10 +18,11 @@ typedef struct shapes {
   const pb_modes *m;
   const size_t *mode;  // of the group
   pb_damped d;
+  size_t nu, ny;             // with those of stacked coordinates
   double *b[2];              // columns × nu
   double *c[2];              // ny × columns
   double *gather, *product;  // of outputs or inputs; of a matrix product
-  double *w[2];              // n × columns: (λ I + Ĉ) X; NULL without displacements
+  double *w[2];              // n × columns: (λ I + Ĉ) X; NULL without stacked coordinates
 } shapes;
 
 static void shapes_clear(shapes *s) {
@@ -35,17 +37,17 @@ static void shapes_clear(shapes *s) {
 }
 
 static pb_status shapes_new(shapes *s, pb_error *err) {
-  const size_t n = s->d.n, columns = s->d.columns, nu = s->m->nu, ny = s->m->ny;
+  const size_t n = s->d.n, columns = s->d.columns, nu = s->nu, ny = s->ny;
   bool ok = true;
   for (int i = 0; i < 2; i++) {
-    s->b[i] = malloc((columns * nu + 1) * sizeof(double));
-    s->c[i] = calloc(ny * columns + 1, sizeof(double));
-    s->w[i] = s->m->displacings ? malloc(n * columns * sizeof(double)) : NULL;
-    ok = ok && s->b[i] && s->c[i] && (s->w[i] || !s->m->displacings);
+    s->b[i] = pb_array_new(columns * nu + 1, sizeof(double));
+    s->c[i] = pb_array_zero(ny * columns + 1, sizeof(double));
+    s->w[i] = s->m->stacked ? pb_array_new(n * columns, sizeof(double)) : NULL;
+    ok = ok && s->b[i] && s->c[i] && (s->w[i] || !s->m->stacked);
   }
   const size_t more = ny > nu ? ny : nu;
-  s->gather = malloc((n * more + 1) * sizeof(double));
-  s->product = malloc((ny * columns + 1) * sizeof(double));
+  s->gather = pb_array_new(n * more + 1, sizeof(double));
+  s->product = pb_array_new(s->m->ny * columns + 1, sizeof(double));
   ok = ok && s->gather && s->product;
   return ok ? PB_OK : pb_fail_memory(err, "");
 }
@@ -78,8 +80,8 @@ static void add_outputs(shapes *s, int order) {
       for (int i = 0; i < order; i++) factor *= s->d.cluster.lambda[k];
       const double re = creal(factor), im = cimag(factor), *p = s->product + k * s->m->ny;
       for (size_t o = 0; o < s->m->ny; o++) {
-        s->c[0][o + k * s->m->ny] += re * p[o];
-        s->c[1][o + k * s->m->ny] += im * p[o];
+        s->c[0][o + k * s->ny] += re * p[o];
+        s->c[1][o + k * s->ny] += im * p[o];
       }
     }
   }
@@ -97,17 +99,49 @@ static void make_displaced(shapes *s) {
   }
 }
 
-// b of the inputs first … first + count, against left vectors l.
-static void make_inputs(shapes *s, double *const l[2], size_t first, size_t count) {
-  const int n = (int)s->d.n, columns = (int)s->d.columns, inputs = (int)count;
+// Of the plant's own inputs.
+static void make_inputs(shapes *s) {
+  const int n = (int)s->d.n, columns = (int)s->d.columns, inputs = (int)s->m->nu;
   const double one = 1, zero = 0;
-  if (!count) return;
-  for (size_t i = 0; i < count; i++)
+  for (size_t i = 0; i < s->m->nu; i++)
     for (size_t j = 0; j < s->d.n; j++)
-      s->gather[j + i * s->d.n] = s->m->force[mode_of(s, j) + (first + i) * s->m->n];
-  for (int part = 0; part < 2; part++)
-    dgemm_("T", "N", &columns, &inputs, &n, &one, l[part], &n, s->gather, &n, &zero,
-           s->b[part] + first * s->d.columns, &columns);
+      s->gather[j + i * s->d.n] = s->m->force[mode_of(s, j) + i * s->m->n];
+  for (int part = 0; part < 2 && inputs; part++)
+    dgemm_("T", "N", &columns, &inputs, &n, &one, s->d.x[part], &n, s->gather, &n, &zero,
+           s->b[part], &columns);
+}
+
+static void transpose(const double *a, size_t rows, size_t cols, size_t ld, double *out) {
+  enum { TILE = 16 };
+  for (size_t j = 0; j < cols; j += TILE)
+    for (size_t i = 0; i < rows; i += TILE)
+      for (size_t jj = j; jj < j + TILE && jj < cols; jj++)
+        for (size_t ii = i; ii < i + TILE && ii < rows; ii++) out[jj + ii * cols] = a[ii + jj * ld];
+}
+
+// Stacked coordinates: q = S x z, q̇ = λ q; an impulse counts with (S x)ᵀ, a displacement with S
+// times (λ I + Ĉ) x.
+static void make_motion(shapes *s) {
+  const size_t ns = s->m->stacked, columns = s->d.columns, ny = s->ny;
+  const int n = (int)s->d.n, rows = (int)ns, cols = (int)columns, ld = (int)ny;
+  const double one = 1, zero = 0;
+  for (size_t j = 0; j < s->d.n; j++)
+    memcpy(s->gather + j * ns, s->m->motion + mode_of(s, j) * ns, ns * sizeof(double));
+  for (int part = 0; part < 2; part++) {
+    double *q = s->c[part] + s->m->ny, *v = q + ns, *b = s->b[part] + s->m->nu * columns;
+    dgemm_("N", "N", &rows, &cols, &n, &one, s->gather, &rows, s->w[part], &n, &zero, v, &ld);
+    transpose(v, ns, columns, ny, b);
+    dgemm_("N", "N", &rows, &cols, &n, &one, s->gather, &rows, s->d.x[part], &n, &zero, q, &ld);
+    transpose(q, ns, columns, ny, b + ns * columns);
+  }
+  for (size_t k = 0; k < columns; k++) {
+    const double re = creal(s->d.cluster.lambda[k]), im = cimag(s->d.cluster.lambda[k]);
+    const double *qr = s->c[0] + s->m->ny + k * ny, *qi = s->c[1] + s->m->ny + k * ny;
+    for (size_t r = 0; r < ns; r++) {
+      s->c[0][s->m->ny + ns + r + k * ny] = re * qr[r] - im * qi[r];
+      s->c[1][s->m->ny + ns + r + k * ny] = re * qi[r] + im * qr[r];
+    }
+  }
 }
 
 // B of cluster c.
@@ -134,8 +168,9 @@ static void gram(const pb_damped *d, size_t c, double complex *b) {
 // b ← B⁻¹ b, cluster by cluster.
 static pb_status scale_inputs(shapes *s, bool *done, pb_error *err) {
   const pb_clusters *c = &s->d.cluster;
-  const size_t nu = s->m->nu, ld = s->d.columns, wide = 2 * c->widest;
-  double complex *b = malloc(wide * wide * sizeof *b), *x = malloc((wide * nu + 1) * sizeof *x);
+  const size_t nu = s->nu, ld = s->d.columns, wide = 2 * c->widest;
+  double complex *b = pb_array_new(wide * wide, sizeof *b),
+                 *x = pb_array_new(wide * nu + 1, sizeof *x);
   int *pivot = malloc(wide * sizeof *pivot);
   const bool ok = b && x && pivot;
   for (size_t k = 0; k < c->count && ok && *done; k++) {
@@ -162,7 +197,7 @@ static pb_status scale_inputs(shapes *s, bool *done, pb_error *err) {
 // A block of the complex pair k in real form: its states are 2 Re z and −2 Im z.
 static pb_status emit_pair(const shapes *s, size_t k, double *b, double *c,
                            pb_model_builder *builder, pb_error *err) {
-  const size_t nu = s->m->nu, ny = s->m->ny, ld = s->d.columns;
+  const size_t nu = s->nu, ny = s->ny, ld = s->d.columns;
   const double re = creal(s->d.cluster.lambda[k]), im = cimag(s->d.cluster.lambda[k]);
   const double a[4] = {re, -im, im, re};
   for (size_t i = 0; i < nu; i++) {
@@ -178,7 +213,7 @@ static pb_status emit_pair(const shapes *s, size_t k, double *b, double *c,
 // A block of the real eigenvalues j and k; only that of j when both are the same.
 static pb_status emit_real(const shapes *s, size_t j, size_t k, double *b, double *c,
                            pb_model_builder *builder, pb_error *err) {
-  const size_t nu = s->m->nu, ny = s->m->ny, ld = s->d.columns, at[2] = {j, k};
+  const size_t nu = s->nu, ny = s->ny, ld = s->d.columns, at[2] = {j, k};
   const size_t size = j == k ? 1 : 2;
   const double a[4] = {creal(s->d.cluster.lambda[j]), 0, 0, creal(s->d.cluster.lambda[k])};
   for (size_t r = 0; r < size; r++) {
@@ -192,8 +227,8 @@ static pb_status emit_real(const shapes *s, size_t j, size_t k, double *b, doubl
 
 static pb_status emit(const shapes *s, pb_model_builder *builder, pb_error *err) {
   const pb_clusters *c = &s->d.cluster;
-  double *b = malloc((2 * s->m->nu + 1) * sizeof *b),
-         *out = malloc((2 * s->m->ny + 1) * sizeof *out);
+  double *b = pb_array_new(2 * s->nu + 1, sizeof *b),
+         *out = pb_array_new(2 * s->ny + 1, sizeof *out);
   pb_status st = b && out ? PB_OK : pb_fail_memory(err, "");
   size_t waiting = s->d.columns;  // a real eigenvalue without a partner yet
   for (size_t i = 0; i < c->count && !st; i++)
@@ -215,7 +250,8 @@ static pb_status emit(const shapes *s, pb_model_builder *builder, pb_error *err)
 
 static pb_status solve(shapes *s, size_t count, bool *done, pb_error *err) {
   const pb_modes *m = s->m;
-  double *omega = malloc(count * sizeof *omega), *damping = malloc(count * count * sizeof *damping);
+  double *omega = malloc(count * sizeof *omega),
+         *damping = pb_array_new(count * count, sizeof *damping);
   pb_status st = omega && damping ? PB_OK : pb_fail_memory(err, "");
   for (size_t j = 0; j < count && !st; j++) {
     omega[j] = m->omega[s->mode[j]];
@@ -230,19 +266,16 @@ static pb_status solve(shapes *s, size_t count, bool *done, pb_error *err) {
 
 pb_status pb_group_build_damped(const pb_modes *m, const size_t *mode, size_t count,
                                 pb_model_builder *builder, bool *done, pb_error *err) {
-  shapes s = {.m = m, .mode = mode};
+  shapes s = {.m = m, .mode = mode, .nu = m->nu + 2 * m->stacked, .ny = m->ny + 2 * m->stacked};
   pb_status st = solve(&s, count, done, err);
   if (!st && *done) st = shapes_new(&s, err);
   if (!st && *done) {
     for (int order = 0; order < 3; order++) add_outputs(&s, order);
-    const size_t displaced = m->displacings ? m->displacing : m->nu;
-    const size_t after = displaced + m->displacings;
-    make_inputs(&s, s.d.x, 0, displaced);
-    if (m->displacings) {
+    make_inputs(&s);
+    if (m->stacked) {
       make_displaced(&s);
-      make_inputs(&s, s.w, displaced, m->displacings);
+      make_motion(&s);
     }
-    make_inputs(&s, s.d.x, after, m->nu - after);
     st = scale_inputs(&s, done, err);
   }
   if (!st && *done) st = emit(&s, builder, err);

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/lapack.h"
 
 static const double two_pi = 6.283185307179586476925286766559;
@@ -192,10 +193,10 @@ static void decouple(size_t n, size_t slow, const double *omega2, const double *
 static pb_status polish(const pb_system *s, double *omega2, double *shape, double *space,
                         pb_error *err) {
   size_t n = s->n, slow = count_slow(omega2, n);
-  double *stiffness = malloc((n * slow + 1) * sizeof *stiffness);
-  double *t = malloc((n * slow + 1) * sizeof *t), *old = malloc((n * slow + 1) * sizeof *old);
-  double *among = malloc((slow * slow + 1) * sizeof *among);
-  long double *work = malloc(2 * n * sizeof *work);
+  double *stiffness = pb_array_new(n * slow + 1, sizeof *stiffness);
+  double *t = pb_array_new(n * slow + 1, sizeof *t), *old = pb_array_new(n * slow + 1, sizeof *old);
+  double *among = pb_array_new(slow * slow + 1, sizeof *among);
+  long double *work = pb_array_new(2 * n, sizeof *work);
   bool ok = stiffness && t && old && among && work;
   if (ok) {
     orthonormalize_slow(s, shape, slow, work);
@@ -274,26 +275,27 @@ static void project(const pb_system *s, const double *shape, double *space, pb_m
   multiply("T", n, s->nu, n, shape, n, s->f, m->force);
   const double *y[3] = {s->y0, s->y1, s->y2};
   for (int i = 0; i < 3; i++) multiply("N", s->ny, n, n, y[i], s->ny, shape, m->output[i]);
+  multiply("N", s->stacked, n, n, s->expand, s->stacked, shape, m->motion);
 }
 
 static pb_status allocate(const pb_system *s, pb_modes *m, pb_error *err) {
   size_t n = s->n;
-  *m = (pb_modes){
-      .n = n, .nu = s->nu, .ny = s->ny, .displacing = s->displacing, .displacings = s->displacings};
+  *m = (pb_modes){.n = n, .nu = s->nu, .ny = s->ny, .stacked = s->stacked};
   m->omega = malloc(n * sizeof(double));
-  m->damping = malloc(n * n * sizeof(double));
-  m->force = malloc(n * s->nu * sizeof(double));
-  bool ok = m->omega && m->damping && m->force;
+  m->damping = pb_array_new(n * n, sizeof(double));
+  m->force = pb_array_new(n * s->nu, sizeof(double));
+  m->motion = s->stacked ? pb_array_new(s->stacked * n, sizeof(double)) : NULL;
+  bool ok = m->omega && m->damping && m->force && (m->motion || !s->stacked);
   for (int i = 0; i < 3; i++) {
-    m->output[i] = malloc(n * s->ny * sizeof(double));
+    m->output[i] = pb_array_new(n * s->ny, sizeof(double));
     ok = ok && m->output[i];
   }
   return ok ? PB_OK : pb_fail_memory(err, "");
 }
 
 pb_status pb_modes_solve(const pb_system *s, pb_warnings *warnings, pb_modes *out, pb_error *err) {
-  double *omega2 = malloc(s->n * sizeof *omega2), *shape = malloc(s->n * s->n * sizeof *shape);
-  double *space = malloc(space_size(s->n) * sizeof *space);
+  double *omega2 = malloc(s->n * sizeof *omega2), *shape = pb_array_new(s->n * s->n, sizeof *shape);
+  double *space = pb_array_new(space_size(s->n), sizeof *space);
   pb_status st = allocate(s, out, err);
   if (!st && (!omega2 || !shape || !space)) st = pb_fail_memory(err, "");
   if (!st) st = eigen(s, omega2, shape, space, err);
@@ -316,6 +318,7 @@ void pb_modes_clear(pb_modes *m) {
   free(m->omega);
   free(m->damping);
   free(m->force);
+  free(m->motion);
   for (int i = 0; i < 3; i++) free(m->output[i]);
   *m = (pb_modes){0};
 }

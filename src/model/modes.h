@@ -8,12 +8,13 @@
 
 typedef struct pb_modes {
   size_t n, nu, ny;
-  double *omega;                   // [n] rad/s, ascending; exactly 0 for rigid-body modes
-  double *damping;                 // n × n: Ĉ = ΦᵀCΦ
-  double *force;                   // n × nu: ΦᵀF
-  double *output[3];               // ny × n: Y_0Φ, Y_1Φ, Y_2Φ
-  size_t rigid;                    // rigid-body modes, first in the list
-  size_t displacing, displacings;  // inputs that are displacements, as of the system
+  double *omega;      // [n] rad/s, ascending; exactly 0 for rigid-body modes
+  double *damping;    // n × n: Ĉ = ΦᵀCΦ
+  double *force;      // n × nu: ΦᵀF
+  double *output[3];  // ny × n: Y_0Φ, Y_1Φ, Y_2Φ
+  size_t rigid;       // rigid-body modes, first in the list
+  size_t stacked;     // stacked coordinates that are followed; 0: none
+  double *motion;     // stacked × n: how they move with the modes
 } pb_modes;
 
 // Solves for the modes. Warns of rigid-body modes. Fails with PB_ERR_NUMERIC, PB_ERR_MEMORY and,

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "assembly/system.h"
+#include "base/array.h"
 #include "base/lapack.h"
 #include "base/text.h"
 #include "model/build.h"
@@ -25,7 +26,7 @@ void pb_motion_map_free(pb_motion_map *map) {
 }
 
 static double *rows(const double *a, size_t ld, size_t first, size_t count, size_t cols) {
-  double *out = malloc((count * cols + 1) * sizeof *out);
+  double *out = pb_array_new(count * cols + 1, sizeof *out);
   for (size_t j = 0; out && j < cols; j++)
     memcpy(out + j * count, a + first + j * ld, count * sizeof *out);
   return out;
@@ -50,7 +51,7 @@ static pb_status extended_compile(pb_plant *plant, pb_warnings *warnings, pb_mod
   pb_system *system = NULL;
   pb_model *extended = NULL;
   pb_system_stack stack = {0};
-  pb_status st = pb_system_assemble_extended(plant, warnings, &system, &stack, err);
+  pb_status st = pb_system_assemble_observed(plant, NULL, warnings, &system, &stack, err);
   map->layout = stack.layout;
   map->n = stack.layout.size;
   map->m = stack.m;

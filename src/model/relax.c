@@ -19,8 +19,9 @@
 
 typedef struct loop {
   const pb_system *system;
-  const pb_model *open;  // its last r inputs are z, its last r outputs e
+  const pb_model *open;  // has r inputs z and r outputs e, behind those of the plant
   size_t nx, nu, ny, r;  // of the closed model: nx with the r states
+  size_t z, e;           // first of the inputs z and of the outputs e: those of the plant's file
   size_t *place;         // [open->nx + r] where each of the states stands in the closed model
   double *a, *v;         // nx × nx
   double *b, *c;         // nx × nu, ny × nx
@@ -39,6 +40,8 @@ static void loop_clear(loop *l) {
 static pb_status loop_new(const pb_system *s, const pb_model *open, loop *l, pb_error *err) {
   const size_t r = s->relaxations, nx = open->nx + r;
   *l = (loop){.system = s, .open = open, .r = r, .nx = nx, .nu = open->nu - r, .ny = open->ny - r};
+  l->z = s->nu - r;
+  l->e = s->ny - r;
   l->place = malloc(nx * sizeof *l->place);
   l->a = calloc(nx * nx, sizeof(double));
   l->v = malloc(nx * nx * sizeof(double));
@@ -48,6 +51,16 @@ static pb_status loop_new(const pb_system *s, const pb_model *open, loop *l, pb_
   if (l->place && l->a && l->v && l->b && l->c && l->size) return PB_OK;
   loop_clear(l);
   return pb_fail_memory(err, "/components");
+}
+
+// Inputs and outputs of the closed model among those of the open one: stacked coordinates that are
+// followed stand behind z and e.
+static size_t open_input(const loop *l, size_t i) {
+  return i < l->z ? i : i + l->r;
+}
+
+static size_t open_output(const loop *l, size_t o) {
+  return o < l->e ? o : o + l->r;
 }
 
 // ---- order: the fastest first, for the accuracy of the slow eigenvalues (compile.c) -------------
@@ -94,17 +107,28 @@ static void fill_modes(loop *l) {
             m->a[m->block_value[k] + i + j * n];
   }
   for (size_t x = 0; x < m->nx; x++) {
-    for (size_t i = 0; i < l->nu; i++) l->b[l->place[x] + i * l->nx] = m->b[x + i * m->nx];
-    for (size_t o = 0; o < l->ny; o++) l->c[o + l->place[x] * l->ny] = m->c[o + x * m->ny];
+    for (size_t i = 0; i < l->nu; i++)
+      l->b[l->place[x] + i * l->nx] = m->b[x + open_input(l, i) * m->nx];
+    for (size_t o = 0; o < l->ny; o++)
+      l->c[o + l->place[x] * l->ny] = m->c[open_output(l, o) + x * m->ny];
   }
 }
 
-// What an input of a system with displacements (motion_map.h) sets of z, or drives of it.
-static double drive(const loop *l, size_t j, size_t input, double dk) {
+// √dk times what an input drives of z; a displacement of the coordinate z itself (motion_map.h)
+// sets it.
+static double drive(const loop *l, size_t j, size_t input) {
   const pb_system *s = l->system;
-  if (input < s->plant->input_count)
-    return dk * l->open->d[l->ny + j + input * l->open->ny] / s->relaxation_time[j];
-  return input == s->displacing + s->relaxation_place[j] ? dk : 0;
+  const double root = sqrt(s->relaxation_stiffness[j]);
+  if (input < l->z)
+    return root * l->open->d[l->e + j + input * l->open->ny] / s->relaxation_time[j];
+  return input == l->z + s->relaxation_place[j] ? root : 0;
+}
+
+// What an output sees of z itself, besides what z does to the plant.
+static double seen(const loop *l, size_t j, size_t output) {
+  const pb_system *s = l->system;
+  if (output < l->e) return s->relaxation_output[output + j * s->ny];
+  return output == l->e + s->relaxation_place[j] ? 1 : 0;
 }
 
 static void fill_relaxations(loop *l) {
@@ -114,17 +138,16 @@ static void fill_relaxations(loop *l) {
     const size_t z = l->place[m->nx + j];
     const double root = sqrt(s->relaxation_stiffness[j]), rate = 1 / s->relaxation_time[j];
     for (size_t x = 0; x < m->nx; x++) {
-      l->a[l->place[x] + z * l->nx] = m->b[x + (l->nu + j) * m->nx] / root;
-      l->a[z + l->place[x] * l->nx] = root * rate * m->c[l->ny + j + x * m->ny];
+      l->a[l->place[x] + z * l->nx] = m->b[x + (l->z + j) * m->nx] / root;
+      l->a[z + l->place[x] * l->nx] = root * rate * m->c[l->e + j + x * m->ny];
     }
     for (size_t k = 0; k < l->r; k++)
       l->a[z + l->place[m->nx + k] * l->nx] =
-          rate * root / sqrt(s->relaxation_stiffness[k]) * m->d[l->ny + j + (l->nu + k) * m->ny];
+          rate * root / sqrt(s->relaxation_stiffness[k]) * m->d[l->e + j + (l->z + k) * m->ny];
     l->a[z + z * l->nx] -= rate;
-    for (size_t i = 0; i < l->nu; i++) l->b[z + i * l->nx] = drive(l, j, i, root);
+    for (size_t i = 0; i < l->nu; i++) l->b[z + i * l->nx] = drive(l, j, i);
     for (size_t o = 0; o < l->ny; o++)
-      l->c[o + z * l->ny] =
-          (m->d[o + (l->nu + j) * m->ny] + s->relaxation_output[o + j * m->ny]) / root;
+      l->c[o + z * l->ny] = (m->d[open_output(l, o) + (l->z + j) * m->ny] + seen(l, j, o)) / root;
   }
 }
 
@@ -184,9 +207,11 @@ pb_status pb_model_relax(const pb_system *s, pb_model_builder *builder, pb_model
     st = diagonalize(&l, err);
   }
   if (!st) st = pb_model_builder_open(&closed, l.nx, l.nu, l.ny, open->modes, err);
+  closed.plain = builder->plain;
   if (!st) st = pb_model_copy_header(open, closed.model, err);
   for (size_t i = 0; i < l.nu && !st; i++)
-    memcpy(closed.model->d + i * l.ny, open->d + i * open->ny, l.ny * sizeof(double));
+    for (size_t o = 0; o < l.ny; o++)
+      closed.model->d[o + i * l.ny] = open->d[open_output(&l, o) + open_input(&l, i) * open->ny];
   if (!st) st = emit(&l, &closed, err);
   if (!st) st = pb_model_builder_close(&closed, s->plant->max_frequency, out, err);
   pb_model_builder_discard(&closed);

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/lapack.h"
 #include "model/electronics.h"
 
@@ -58,9 +59,9 @@ static pb_status matrices_make(pb_transfer *t, pb_error *err) {
   const pb_motion_map *from = t->from_map, *to = t->to_map;
   work w = {0};
   pb_status st = pb_transfer_coordinates(from, to, &w.l, &w.lu, err);
-  w.bm = malloc(to->nx * to->n * sizeof(double));
-  w.bml = malloc(to->nx * from->n * sizeof(double));
-  w.static_ = calloc(to->n * from->nu + 1, sizeof(double));
+  w.bm = pb_array_new(to->nx * to->n, sizeof(double));
+  w.bml = pb_array_new(to->nx * from->n, sizeof(double));
+  w.static_ = pb_array_zero(to->n * from->nu + 1, sizeof(double));
   if (!st && (!w.bm || !w.bml || !w.static_)) st = pb_fail_memory(err, "transfer");
   if (!st) {
     add_part(t, &w, to->bv, from->cv);
@@ -72,8 +73,8 @@ static pb_status matrices_make(pb_transfer *t, pb_error *err) {
 }
 
 static pb_status allocate(pb_transfer *t, pb_error *err) {
-  t->x = calloc(t->to->nx * t->from->nx, sizeof *t->x);
-  t->u = calloc(t->to->nx * t->from->nu, sizeof *t->u);
+  t->x = pb_array_zero(t->to->nx * t->from->nx, sizeof *t->x);
+  t->u = pb_array_zero(t->to->nx * t->from->nu, sizeof *t->u);
   t->input_from = calloc(t->to->nu, sizeof *t->input_from);
   t->output_from = calloc(t->to->ny, sizeof *t->output_from);
   t->before = pb_state_new(t->from);

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/lapack.h"
 #include "model/transfer.h"
 
@@ -166,7 +167,7 @@ static void node_set(const carrier *c, size_t start, size_t node, const double r
 static bool static_shape(const pb_element *e, const bool *given, size_t count, size_t forces,
                          double *shape) {
   const size_t m = e->size, free_count = m - count;
-  double *koo = malloc((free_count * free_count + 1) * sizeof *koo);
+  double *koo = pb_array_new(free_count * free_count + 1, sizeof *koo);
   int *pivot = malloc((free_count + 1) * sizeof *pivot), info = 1;
   if (koo && pivot) {
     size_t col = 0, b = 0;
@@ -195,7 +196,7 @@ static bool static_shape(const pb_element *e, const bool *given, size_t count, s
 static pb_status element_follow(const carrier *c, const pb_element *e, size_t start,
                                 const bool *given, size_t count) {
   const size_t m = e->size, n = c->old->n, free_count = m - count, nu = c->now->nu;
-  double *shape = calloc(free_count * (count + nu) + 1, sizeof *shape);
+  double *shape = pb_array_zero(free_count * (count + nu) + 1, sizeof *shape);
   if (!shape) return pb_fail_memory(c->err, e->file);
   for (size_t j = 0, at = free_count * count; j < nu; j++)
     for (size_t i = 0; i < m; i++)
@@ -420,12 +421,12 @@ pb_status pb_transfer_coordinates(const pb_motion_map *from, const pb_motion_map
                                   double **lu, pb_error *err) {
   const size_t n = from->n, rows = to->n;
   carrier c = {.old = from, .now = to, .err = err};
-  *l = malloc(n * rows * sizeof **l);
-  *lu = malloc(to->nu * rows * sizeof **lu);
-  c.l = calloc(n * rows, sizeof *c.l);
-  c.lu = calloc(to->nu * rows, sizeof *c.lu);
-  c.row = malloc(6 * n * sizeof *c.row);
-  c.next = malloc(6 * n * sizeof *c.next);
+  *l = pb_array_new(n * rows, sizeof **l);
+  *lu = pb_array_new(to->nu * rows, sizeof **lu);
+  c.l = pb_array_zero(n * rows, sizeof *c.l);
+  c.lu = pb_array_zero(to->nu * rows, sizeof *c.lu);
+  c.row = pb_array_new(6 * n, sizeof *c.row);
+  c.next = pb_array_new(6 * n, sizeof *c.next);
   c.known = calloc(to->plant->component_count + 1, sizeof *c.known);
   const bool ok = *l && *lu && c.l && c.lu && c.row && c.next && c.known;
   pb_status st = ok ? carry(&c) : pb_fail_memory(err, "transfer");

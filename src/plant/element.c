@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/lapack.h"
 #include "base/text.h"
 
@@ -78,7 +79,7 @@ static int magnitude_order(const void *a, const void *b) {
 static pb_status solve_free(pb_element *e, pb_error *err) {
   int n = (int)e->size, info = 0, lwork = 1 + 6 * n + 2 * n * n, liwork = 3 + 5 * n, itype = 1;
   size_t bytes = (size_t)n * (size_t)n * sizeof(double);
-  double *mass = malloc(bytes), *work = malloc((size_t)lwork * sizeof *work);
+  double *mass = pb_array_new(1, bytes), *work = pb_array_new((size_t)lwork, sizeof *work);
   double *sorted = malloc((size_t)n * sizeof *sorted);
   int *iwork = malloc((size_t)liwork * sizeof *iwork);
   pb_status st = PB_OK;
@@ -138,11 +139,11 @@ static pb_status check_finite(const double *x, size_t n, const char *name, const
 static pb_status allocate(pb_element *e, const char *name) {
   size_t n = e->size;
   e->file = pb_text_copy(name);
-  e->position = malloc(3 * e->frames * sizeof(double));
-  e->k = malloc(n * n * sizeof(double));
-  e->m = malloc(n * n * sizeof(double));
+  e->position = pb_array_new(3 * e->frames, sizeof(double));
+  e->k = pb_array_new(n * n, sizeof(double));
+  e->m = pb_array_new(n * n, sizeof(double));
   e->omega2 = malloc(n * sizeof(double));
-  e->shape = malloc(n * n * sizeof(double));
+  e->shape = pb_array_new(n * n, sizeof(double));
   bool ok = e->file && e->position && e->k && e->m && e->omega2 && e->shape;
   return ok ? PB_OK : PB_ERR_MEMORY;
 }
@@ -210,7 +211,8 @@ pb_status pb_element_damping(const pb_element *e, double ratio, double *c, pb_er
   int n = (int)e->size;
   size_t size = e->size;
   double one = 1, zero = 0;
-  double *mphi = malloc(size * size * sizeof *mphi), *scaled = malloc(size * size * sizeof *scaled);
+  double *mphi = pb_array_new(size * size, sizeof *mphi),
+         *scaled = pb_array_new(size * size, sizeof *scaled);
   if (!mphi || !scaled) {
     free(mphi);
     free(scaled);

@@ -9,6 +9,8 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "base/array.h"
+
 static double entry(const void *data, enum matio_types type, size_t i, bool *ok) {
   switch (type) {
   case MAT_T_DOUBLE:
@@ -72,7 +74,7 @@ static pb_status read_matrix(mat_t *mat, const char *file, const char *name, pb_
   }
   out->rows = v->dims[0];
   out->cols = v->dims[1];
-  out->p = calloc(out->rows * out->cols, sizeof(double));
+  out->p = pb_array_zero(out->rows * out->cols, sizeof(double));
   if (!out->p) {
     st = pb_fail_memory(err, file);
     goto done;

@@ -17,6 +17,7 @@
 void *__real_malloc(size_t size);
 void *__real_calloc(size_t count, size_t size);
 void *__real_realloc(void *p, size_t size);
+void *__real_aligned_alloc(size_t alignment, size_t size);
 
 static long allocations, failing;  // failing: the number of the allocation that fails; 0: none
 
@@ -32,6 +33,9 @@ void *__wrap_calloc(size_t count, size_t size) {
 }
 void *__wrap_realloc(void *p, size_t size) {
   return fails() ? NULL : __real_realloc(p, size);
+}
+void *__wrap_aligned_alloc(size_t alignment, size_t size) {
+  return fails() ? NULL : __real_aligned_alloc(alignment, size);
 }
 
 typedef pb_status (*subject)(const char *input, pb_error *err);

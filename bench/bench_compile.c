@@ -1,0 +1,235 @@
+// How long from a plant file to a running model, phase by phase, and what does LAPACK need for the
+// modes alone?
+//
+// Baseline: the undamped modes by dsygvd of the plant's own K and M, and the damped ones with their
+// vectors by dgeev of [[0, I], [−M⁻¹K, −M⁻¹C]]: what a general program does with the same
+// matrices, without reading, assembling, outputs or discretisation. All with one BLAS thread, as in
+// the daemon.
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "assembly/system.h"
+#include "base/lapack.h"
+#include "base/text.h"
+#include "bench.h"
+#include "model/motion_map.h"
+#include "plants.h"
+
+// ---- ours: time by phase ------------------------------------------------------------------------
+
+typedef struct stopwatch {
+  double seconds[PB_PHASES], since;
+  int phase;  // −1: none yet
+} stopwatch;
+
+static void stop(stopwatch *w) {
+  const double now = bench_now();
+  if (w->phase >= 0) w->seconds[w->phase] += now - w->since;
+  w->since = now;
+}
+
+static void begin_phase(void *context, pb_phase phase) {
+  stopwatch *w = context;
+  stop(w);
+  w->phase = (int)phase;
+}
+
+// One load; seconds by phase.
+static void load_once(const char *path, double seconds[PB_PHASES]) {
+  stopwatch w = {.phase = -1};
+  const pb_observer observer = {begin_phase, &w};
+  pb_model *model = NULL;
+  pb_error err = {0};
+  bench_check(pb_model_load_observed(path, &observer, NULL, &model, &err), &err);
+  stop(&w);
+  pb_model_free(model);
+  memcpy(seconds, w.seconds, sizeof w.seconds);
+}
+
+static double total(const double seconds[PB_PHASES]) {
+  double sum = 0;
+  for (int k = 0; k < PB_PHASES; k++) sum += seconds[k];
+  return sum;
+}
+
+// ---- the baseline -------------------------------------------------------------------------------
+
+typedef struct dense {
+  pb_plant *plant;
+  pb_system *system;
+  int n;
+} dense;
+
+static dense dense_open(const char *path) {
+  dense d = {0};
+  pb_error err = {0};
+  bench_check(pb_plant_load(path, NULL, &d.plant, &err), &err);
+  bench_check(pb_system_assemble(d.plant, NULL, &d.system, &err), &err);
+  d.n = (int)d.system->n;
+  return d;
+}
+
+static void dense_close(dense *d) {
+  pb_system_free(d->system);
+  pb_plant_free(d->plant);
+}
+
+static void undamped(const dense *d) {
+  const size_t n = d->system->n;
+  int size = d->n, type = 1, info, lwork = 1 + 6 * size + 2 * size * size, liwork = 3 + 5 * size;
+  double *k = bench_memory(n * n, sizeof *k), *m = bench_memory(n * n, sizeof *m);
+  double *w = bench_memory(n, sizeof *w), *work = bench_memory((size_t)lwork, sizeof *work);
+  int *iwork = bench_memory((size_t)liwork, sizeof *iwork);
+  memcpy(k, d->system->k, n * n * sizeof *k);
+  memcpy(m, d->system->m, n * n * sizeof *m);
+  dsygvd_(&type, "V", "U", &size, k, &size, m, &size, w, work, &lwork, iwork, &liwork, &info);
+  if (info) bench_fail("dsygvd: %d", info);
+  free(k);
+  free(m);
+  free(w);
+  free(work);
+  free(iwork);
+}
+
+static void damped(const dense *d) {
+  const size_t n = d->system->n, nx = 2 * n;
+  int size = d->n, states = 2 * size, info, lwork = 64 * states, one = 1;
+  double *m = bench_memory(n * n, sizeof *m), *a = bench_memory(nx * nx, sizeof *a);
+  double *v = bench_memory(nx * nx, sizeof *v), *w = bench_memory(2 * nx, sizeof *w);
+  double *work = bench_memory((size_t)lwork, sizeof *work), none;
+  memcpy(m, d->system->m, n * n * sizeof *m);
+  for (size_t j = 0; j < n; j++) {
+    a[j + (n + j) * nx] = 1;
+    for (size_t i = 0; i < n; i++) {
+      a[n + i + j * nx] = -d->system->k[i + j * n];
+      a[n + i + (n + j) * nx] = -d->system->c[i + j * n];
+    }
+  }
+  dpotrf_("U", &size, m, &size, &info);
+  if (!info) dpotrs_("U", &size, &states, m, &size, a + n, &states, &info);
+  if (!info)
+    dgeev_("N", "V", &states, a, &states, w, w + nx, &none, &one, v, &states, work, &lwork, &info);
+  if (info) bench_fail("dgeev: %d", info);
+  free(m);
+  free(a);
+  free(v);
+  free(w);
+  free(work);
+}
+
+static double solve_dense(const dense *d) {
+  const double since = bench_now();
+  undamped(d);
+  damped(d);
+  return bench_now() - since;
+}
+
+// ---- turn by turn -------------------------------------------------------------------------------
+
+typedef struct run {
+  double phase[PB_PHASES], total, dense, ratio;  // medians
+} run;
+
+static double median(double *value, size_t count) {
+  return bench_stats_of(value, count).median;
+}
+
+static run measure(bench *b, const char *path, size_t states) {
+  enum { MOST = 41 };
+  const size_t repeats = states > 1000 ? 3 : bench_quick(b) ? 7 : MOST;
+  double phase[PB_PHASES][MOST], sum[MOST], base[MOST], ratio[MOST], seconds[PB_PHASES];
+  dense d = dense_open(path);
+  run out;
+  load_once(path, seconds);  // the first one fills caches of the C library and of BLAS
+  for (size_t k = 0; k < repeats; k++) {
+    load_once(path, seconds);
+    for (int p = 0; p < PB_PHASES; p++) phase[p][k] = seconds[p];
+    sum[k] = total(seconds);
+    base[k] = k > 0 && states > 1000 ? base[0] : solve_dense(&d);  // seconds long: once is enough
+    ratio[k] = base[k] / sum[k];
+  }
+  for (int p = 0; p < PB_PHASES; p++) out.phase[p] = median(phase[p], repeats);
+  out.total = median(sum, repeats);
+  out.dense = median(base, repeats);
+  out.ratio = median(ratio, repeats);
+  dense_close(&d);
+  return out;
+}
+
+// A changed plant: compiled with the map that carries a running plant's motion over.
+static double with_map(const char *path, size_t states) {
+  char *text = NULL, *directory = strdup(path);
+  size_t length;
+  pb_error err = {0};
+  if (!directory) bench_fail("out of memory");
+  *strrchr(directory, '/') = '\0';
+  bench_check(pb_text_read(path, &text, &length, &err), &err);
+  double seconds[11];
+  const size_t repeats = states > 1000 ? 1 : 11;
+  for (size_t k = 0; k < repeats; k++) {
+    pb_model *model = NULL;
+    pb_motion_map *map = NULL;
+    const double since = bench_now();
+    bench_check(pb_model_parse(text, length, directory, NULL, &model, &map, NULL, &err), &err);
+    seconds[k] = bench_now() - since;
+    pb_model_free(model);
+    pb_motion_map_free(map);
+  }
+  free(text);
+  free(directory);
+  return median(seconds, repeats);
+}
+
+static const bench_column columns[] = {
+    {"states", "states", NULL, 4},         {"read", "read", "ms", 3},
+    {"assemble", "assemble", "ms", 3},     {"eliminate", "eliminate", "ms", 3},
+    {"modes", "modes", "ms", 3},           {"damp", "damped modes", "ms", 3},
+    {"discretize", "discretise", "ms", 3}, {"total", "file to model", "ms", 4},
+    {"mapped", "with map", "ms", 4},       {"dense", "dsygvd and dgeev", "ms", 4},
+    {"ratio", "ratio", NULL, 3},
+};
+
+static const struct {
+  size_t states;
+  double seconds, ratio;  // goals
+} goals[] = {{48, 5e-3, 0.5}, {252, 0.1, 3}, {2100, 3, 4}};
+
+static void judge(bench *b, const bench_plant *plant, const run *r) {
+  for (size_t k = 0; k < sizeof goals / sizeof goals[0]; k++) {
+    char what[160];
+    if (plant->model->nx != goals[k].states) continue;
+    snprintf(what, sizeof what, "%zu states: file to model beside dsygvd and dgeev alone",
+             goals[k].states);
+    bench_goal(b, what, r->ratio, BENCH_AT_LEAST, goals[k].ratio);
+    snprintf(what, sizeof what, "%zu states: file to model", goals[k].states);
+    bench_target(b, what, 1e3 * r->total, "ms", BENCH_AT_MOST, 1e3 * goals[k].seconds);
+  }
+}
+
+int main(int argc, char **argv) {
+  bench *b = bench_begin(argc, argv, "compile", "How long from a plant file to a running model?");
+  bench_blas_threads(1);
+  bench_plants plants = bench_plants_load(bench_quick(b) ? 1000 : 0);
+  bench_table *t = bench_table_add(b, "compile", "From plant file to model", "plant",
+                                   sizeof columns / sizeof columns[0], columns);
+  for (size_t k = 0; k < plants.count; k++) {
+    const bench_plant *p = &plants.item[k];
+    const size_t nx = p->model->nx;
+    const run r = measure(b, p->path, nx);
+    double row[] = {(double)nx, r.phase[0],    r.phase[1],
+                    r.phase[2], r.phase[3],    r.phase[4],
+                    r.phase[5], r.total,       with_map(p->path, nx),
+                    r.dense,    1e-3 * r.ratio};
+    for (size_t c = 1; c < sizeof row / sizeof row[0]; c++) row[c] *= 1e3;
+    bench_row(t, p->name, row);
+    judge(b, p, &r);
+  }
+  bench_growth(b, t, "states", "total", 100);
+  bench_growth(b, t, "states", "dense", 100);
+  bench_note(b, "with map: as the daemon compiles a plant that may be changed while it runs");
+  if (bench_quick(b)) bench_note(b, "quick: without plants above 1000 states");
+  bench_plants_free(&plants);
+  return bench_end(b);
+}

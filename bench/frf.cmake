@@ -1,0 +1,1 @@
+pb_bench(frf SOURCES bench_frf.c plants.c LIBS LAPACK::LAPACK)
