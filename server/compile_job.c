@@ -29,6 +29,7 @@ static pb_status compatible(const pb_model *before, const pb_model *next, pb_err
 }
 
 static pb_status compile(pb_compile_job *job) {
+  job->warnings.notes = &job->notes;
   pb_status status = pb_revision_build(job->text, job->directory, job->number, &job->warnings,
                                        &job->next, &job->err);
   if (!status) status = compatible(job->before->model, job->next->model, &job->err);
@@ -67,6 +68,7 @@ void pb_compile_join(pb_compile_job *job) {
 
 void pb_compile_clear(pb_compile_job *job) {
   pb_warnings_clear(&job->warnings);
+  pb_warnings_clear(&job->notes);
   pb_revision_free(job->next);
   pb_transfer_free(job->transfer);
   free(job->state);

@@ -188,6 +188,9 @@ static void model_told(pb_daemon *d) {
   for (size_t i = 0; i < p->job.warnings.count; i++)
     pb_log("plantbusd: revision %u: warning: %s: %s", e->revision, p->job.warnings.item[i].where,
            p->job.warnings.item[i].message);
+  for (size_t i = 0; i < p->job.notes.count; i++)
+    pb_log("plantbusd: revision %u: element %s: %s", e->revision, p->job.notes.item[i].where,
+           p->job.notes.item[i].message);
 }
 
 static void model_made(pb_daemon *d) {

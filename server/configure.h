@@ -27,7 +27,7 @@ typedef struct pb_compile_job {
   pb_revision *next;
   pb_state *state;
   pb_transfer *transfer;
-  pb_warnings warnings;
+  pb_warnings warnings, notes;
   pb_status status;
   pb_error err;
   double seconds;

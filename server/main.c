@@ -42,6 +42,14 @@ static void tell_warnings(const char *plant, pb_warnings *warnings) {
   pb_warnings_clear(warnings);
 }
 
+// The health of each element that the plant is made of.
+static void tell_elements(const char *plant, pb_warnings *notes) {
+  for (size_t i = 0; i < notes->count; i++)
+    fprintf(stderr, "plantbusd: %s: element %s: %s\n", plant, notes->item[i].where,
+            notes->item[i].message);
+  pb_warnings_clear(notes);
+}
+
 static void tell_ready(const pb_daemon *daemon) {
   const pb_model *m = daemon->live->model;
   printf("plantbusd: ready: plant '%s', %zu states, %g Hz, %s, domain %u\n", m->name, m->nx,
@@ -86,12 +94,13 @@ int main(int argc, char **argv) {
   pb_options_parse(argc, argv, &options);
   streams_open();
   pb_daemon *daemon = calloc(1, sizeof *daemon);
-  pb_warnings warnings = {0};
+  pb_warnings notes = {0}, warnings = {.notes = &notes};
   pb_error err = {PB_OK, "", ""};
   // Until the plant is loaded a signal ends the process at once: there is nothing to undo.
   pb_status status =
       daemon ? pb_daemon_load(daemon, &options, &warnings, &err) : pb_fail_memory(&err, "daemon");
   tell_warnings(options.plant, &warnings);
+  tell_elements(options.plant, &notes);
   signals_prepare();
   signals_mask(SIG_BLOCK);
   if (!status) status = pb_daemon_start(daemon, &err);

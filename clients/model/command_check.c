@@ -5,9 +5,15 @@
 #include <string.h>
 
 #include "assembly/system.h"
+#include "plant/element_doctor.h"
 #include "plant/plant.h"
 #include "table.h"
 #include "tool.h"
+
+typedef struct element_state {
+  const pb_element *element;
+  pb_diagnosis health;
+} element_state;
 
 typedef struct check {
   pb_plant *plant;
@@ -15,8 +21,8 @@ typedef struct check {
   pb_warnings warnings;
   pb_error error;  // code PB_OK: the plant is usable
   size_t elements;
-  const pb_element **element;  // [elements] each once
-  double fastest_growth;       // largest real part of the poles, 1/s
+  element_state *element;  // [elements] each once
+  double fastest_growth;   // largest real part of the poles, 1/s
 } check;
 
 static const pb_element *joint_element(const pb_connection *c) {
@@ -26,9 +32,9 @@ static const pb_element *joint_element(const pb_connection *c) {
 static void add_element(check *c, const pb_element *element) {
   if (!element) return;
   for (size_t k = 0; k < c->elements; k++) {
-    if (!strcmp(c->element[k]->file, element->file)) return;
+    if (!strcmp(c->element[k].element->file, element->file)) return;
   }
-  c->element[c->elements++] = element;
+  c->element[c->elements++].element = element;
 }
 
 static pb_status collect_elements(check *c, pb_error *err) {
@@ -42,7 +48,10 @@ static pb_status collect_elements(check *c, pb_error *err) {
   for (size_t k = 0; k < p->connection_count; k++) {
     add_element(c, joint_element(&p->connection[k]));
   }
-  return PB_OK;
+  pb_status status = PB_OK;
+  for (size_t k = 0; !status && k < c->elements; k++)
+    status = pb_element_check(c->element[k].element, &c->element[k].health, err);
+  return status;
 }
 
 // A pole to the right of the axis by more than rounding would make every simulation run away.
@@ -79,7 +88,7 @@ static void run_check(const tool *t, check *c) {
 static void elements_json(pb_jsonout *json, const check *c) {
   pb_jsonout_array(json, "elements");
   for (size_t k = 0; k < c->elements; k++) {
-    const pb_element *e = c->element[k];
+    const pb_element *e = c->element[k].element;
     pb_jsonout_object(json, NULL);
     pb_jsonout_text(json, "file", e->file);
     pb_jsonout_integer(json, "frames", e->frames);
@@ -90,6 +99,10 @@ static void elements_json(pb_jsonout *json, const check *c) {
     pb_jsonout_number(json, "asymmetry_m", e->health.asymmetry_m);
     pb_jsonout_number(json, "rigid_body_hz", e->health.rigid_hz);
     pb_jsonout_number(json, "first_flexible_hz", e->health.flexible_hz);
+    pb_jsonout_boolean(json, "sound", !c->element[k].health.findings);
+    char summary[1024];
+    pb_diagnosis_summary(&c->element[k].health, summary, sizeof summary);
+    pb_jsonout_text(json, "doctor", summary);
     pb_jsonout_object_end(json);
   }
   pb_jsonout_array_end(json);
@@ -141,7 +154,7 @@ static pb_status print_elements(const check *c, pb_error *err) {
   pb_table_number_column(&table, "rigid body", "Hz", 3);
   pb_table_number_column(&table, "first mode", "Hz", 5);
   for (size_t k = 0; k < c->elements; k++) {
-    const pb_element *e = c->element[k];
+    const pb_element *e = c->element[k].element;
     pb_table_text(&table, base_name(e->file));
     pb_table_count(&table, e->frames);
     pb_table_count(&table, e->size - 6 * e->frames);
@@ -152,8 +165,13 @@ static pb_status print_elements(const check *c, pb_error *err) {
     pb_table_number(&table, e->health.flexible_hz);
   }
   pb_status status = pb_table_print(&table, stdout, 0, err);
-  putchar('\n');
   pb_table_free(&table);
+  for (size_t k = 0; k < c->elements; k++) {
+    char summary[1024];
+    pb_diagnosis_summary(&c->element[k].health, summary, sizeof summary);
+    printf("%s: %s\n", base_name(c->element[k].element->file), summary);
+  }
+  putchar('\n');
   return status;
 }
 

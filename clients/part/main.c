@@ -4,6 +4,9 @@
 static const pb_command commands[] = {
     {"build", part_build, "from dimensions to an element"},
     {"reduce", part_reduce, "full K and M from outside to an element"},
+    {"import", part_import, "from other programs' matrices to an element"},
+    {"doctor", part_doctor, "what is wrong with an element, and its repair"},
+    {"truncate", part_truncate, "an element with as few modes as a band needs"},
     {0},
 };
 

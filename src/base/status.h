@@ -46,6 +46,9 @@ typedef struct pb_warning {
 typedef struct pb_warnings {
   size_t count, capacity;
   pb_warning *item;
+  struct pb_warnings
+      *notes;  // where remarks that warn of nothing go, as the health of each element
+               // that is read; NULL: they are not made. The caller's own list
 } pb_warnings;
 
 // Name ("ERR_SCHEMA") and explanation of a status; never NULL. [any]

@@ -1,3 +1,3 @@
 # Readers of other programs' files.
-list(APPEND PB_PART_SOURCES lines.c matrix_abaqus.c matrix_ansys.c matrix_build.c matrix_calculix.c
-     matrix_csv.c matrix_file.c matrix_market.c matrix_mat.c matrix_nastran.c node_file.c)
+list(APPEND PB_PART_SOURCES import.c lines.c matrix_abaqus.c matrix_ansys.c matrix_build.c matrix_calculix.c
+     matrix_csv.c matrix_file.c matrix_market.c matrix_mat.c matrix_nastran.c node_file.c truncate.c truncate_proof.c)

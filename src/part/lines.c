@@ -11,7 +11,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-enum { FIRST_CAPACITY = 1 << 18, LAST_CAPACITY = 1 << 28 };
+enum { FIRST_CAPACITY = 1 << 16, LAST_CAPACITY = 1 << 28 };
 
 pb_status pb_lines_open(pb_lines *in, const char *path, pb_error *err) {
   *in = (pb_lines){.path = path, .err = err};

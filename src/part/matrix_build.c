@@ -165,20 +165,16 @@ pb_status pb_matrix_build_section(pb_matrix_build *b, pb_lines *in, const char *
   return PB_OK;
 }
 
-static bool ends_with(const char *text, char letter) {
-  size_t length = strlen(text);
-  return length && toupper((unsigned char)text[length - 1]) == letter;
-}
-
-// 'K', 'M' or 0 by the names that programs and people give.
+// 'K', 'M' or 0 by the names that programs and people give: STIFFNESS, MAT_K, MATK, KAAX …
 static char meaning(const char *name) {
   if (strcasestr(name, "STIF")) return 'K';
   if (strcasestr(name, "MASS")) return 'M';
   if (strcasestr(name, "DAMP")) return 0;
-  if (ends_with(name, 'K')) return 'K';
-  if (ends_with(name, 'M')) return 'M';
-  char first = (char)toupper((unsigned char)name[0]);
-  return first == 'K' || first == 'M' ? first : 0;
+  if (!strcasecmp(name, "MATK")) return 'K';
+  const char *suffix = strrchr(name, '_');
+  char letter =
+      (char)toupper((unsigned char)(suffix && suffix[1] && !suffix[2] ? suffix[1] : name[0]));
+  return letter == 'K' || letter == 'M' ? letter : 0;
 }
 
 static bool fits(const pb_matrix_section *s, const char *name) {

@@ -68,6 +68,9 @@ typedef struct pb_dof_file {
   pb_row_label *label;  // [count]
 } pb_dof_file;
 
+// Whether a file, of nodes as a rule, has an Ansys list of masters in it. [init]
+pb_status pb_dof_file_has_masters(const char *path, bool *out, pb_error *err);
+
 // Fails with PB_ERR_IO, PB_ERR_SYNTAX, PB_ERR_MEMORY. [init]
 pb_status pb_dof_file_read(const char *path, pb_dof_file *out, pb_error *err);
 void pb_dof_file_clear(pb_dof_file *file);

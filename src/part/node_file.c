@@ -298,6 +298,13 @@ static pb_status read_dof_table(pb_lines *in, pb_matrix_build *b) {
   return in->status;
 }
 
+pb_status pb_dof_file_has_masters(const char *path, bool *out, pb_error *err) {
+  list_kind kind;
+  pb_status st = judge_list(path, true, &kind, err);
+  *out = !st && kind == LIST_MLIST;
+  return st;
+}
+
 pb_status pb_dof_file_read(const char *path, pb_dof_file *out, pb_error *err) {
   *out = (pb_dof_file){0};
   pb_matrix_file rows = {0};

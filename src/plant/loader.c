@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/text.h"
+#include "plant/element_doctor.h"
 
 static pb_status keep_element(pb_loader *loader, pb_element *e) {
   pb_element **list = realloc(loader->element, (loader->element_count + 1) * sizeof *list);
@@ -14,6 +15,17 @@ static pb_status keep_element(pb_loader *loader, pb_element *e) {
   loader->element = list;
   list[loader->element_count++] = e;
   return PB_OK;
+}
+
+// One line on its health to whoever wants to know.
+static pb_status note_health(pb_loader *loader, const pb_element *e) {
+  if (!loader->warnings || !loader->warnings->notes) return PB_OK;
+  pb_diagnosis diagnosis;
+  char text[sizeof((pb_warning *)0)->message];
+  pb_status st = pb_element_check(e, &diagnosis, loader->err);
+  if (st) return st;
+  pb_diagnosis_summary(&diagnosis, text, sizeof text);
+  return pb_warn(loader->warnings->notes, loader->err, e->file, "%s", text);
 }
 
 pb_status pb_loader_element(pb_loader *loader, const pb_reader *r, pb_element **out) {
@@ -35,7 +47,7 @@ pb_status pb_loader_element(pb_loader *loader, const pb_reader *r, pb_element **
     st = pb_element_load(path.text, loader->warnings, &e, &inner);
     if (st) {
       pb_fail(loader->err, st, where, "%.200s: %.280s", inner.where, inner.message);
-    } else if ((st = keep_element(loader, e))) {
+    } else if ((st = note_health(loader, e)) || (st = keep_element(loader, e))) {
       pb_element_free(e);
     } else {
       *out = pb_element_share(e);

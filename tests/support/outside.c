@@ -19,8 +19,12 @@ double outside_entry(const double *x, size_t i, size_t j) {
 }
 
 void outside_make(outside_element *e) {
-  static const beam steel = {
-      .length = 0.1, .ea = 2e7, .ei = 50, .gj = 40, .mass = 0.08, .polar_inertia = 2e-6};
+  static const beam steel = {.length = 0.1,
+                             .ea = 20317431.7,
+                             .ei = 51.2837163,
+                             .gj = 40.713371,
+                             .mass = 0.08,
+                             .polar_inertia = 2.0371e-6};
   double k[18 * 18], m[18 * 18];
   memset(e, 0, sizeof *e);
   beam_chain(&steel, 2, k, m, e->position);

@@ -1,0 +1,372 @@
+// plantbus-part doctor: what is wrong with an element, and its repair.
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/text.h"
+#include "element_out.h"
+#include "jsonout.h"
+#include "options.h"
+#include "part.h"
+#include "plant/element_doctor.h"
+#include "source.h"
+#include "table.h"
+
+enum { KEY_JSON = 0x100, KEY_REPAIR, KEY_WEIGHTED, KEY_SI, KEY_ENDS, KEY_AXIS };
+
+typedef struct options {
+  source in;
+  const char *out;
+  bool json, repair;
+  pb_doctor_options doctor;
+  size_t base, tip;
+  bool has_axis;
+  double axis[3];
+} options;
+
+static const struct argp_option option_table[] = {
+    {"repair", KEY_REPAIR, NULL, 0, "Cure what can be cured and write the element to -o", 1},
+    {NULL, 'o', "FILE", 0, "Where the repaired element goes: MAT v5, or Matrix Market (.mtx)", 1},
+    {"weighted", KEY_WEIGHTED, NULL, 0,
+     "Measure the change of each entry of K by the scale of rounding, √(K_ii K_jj)", 1},
+    {"si", KEY_SI, NULL, 0, "The units are SI, however light or large the part may seem", 1},
+    {"json", KEY_JSON, NULL, 0, "Print JSON instead of text", 1},
+    {"ends", KEY_ENDS, "A,B", 0, "Frame that is held and frame that is free (default 1,2)", 2},
+    {"axis", KEY_AXIS, "X,Y,Z", 0, "Direction of the axial mode (default from A to B)", 2},
+    {0},
+};
+
+static void parse_ends(options *o, const char *arg, struct argp_state *state) {
+  double *value = NULL;
+  size_t count = 0;
+  pb_option_double_list(state, "--ends", arg, &value, &count);
+  bool ok = count == 2 && value[0] >= 1 && value[1] >= 1 && value[0] != value[1] &&
+            value[0] == floor(value[0]) && value[1] == floor(value[1]) && value[0] < 1e6 &&
+            value[1] < 1e6;
+  if (!ok) argp_error(state, "--ends: expected two frames, as 1,2");
+  o->base = (size_t)value[0] - 1;
+  o->tip = (size_t)value[1] - 1;
+  free(value);
+}
+
+static void parse_axis(options *o, const char *arg, struct argp_state *state) {
+  double *value = NULL, norm;
+  size_t count = 0;
+  pb_option_double_list(state, "--axis", arg, &value, &count);
+  norm = count == 3 ? sqrt(value[0] * value[0] + value[1] * value[1] + value[2] * value[2]) : 0;
+  if (!(norm > 0)) argp_error(state, "--axis: expected three numbers, not all zero");
+  for (int a = 0; a < 3; a++) o->axis[a] = value[a] / norm;
+  o->has_axis = true;
+  free(value);
+}
+
+static error_t parse_option(int key, char *arg, struct argp_state *state) {
+  options *o = state->input;
+  switch (key) {
+  case ARGP_KEY_INIT:
+    state->child_inputs[0] = &o->in;
+    break;
+  case KEY_REPAIR:
+    o->repair = true;
+    break;
+  case 'o':
+    o->out = arg;
+    break;
+  case KEY_WEIGHTED:
+    o->doctor.weighted = true;
+    break;
+  case KEY_SI:
+    o->doctor.trust_units = true;
+    break;
+  case KEY_JSON:
+    o->json = true;
+    break;
+  case KEY_ENDS:
+    parse_ends(o, arg, state);
+    break;
+  case KEY_AXIS:
+    parse_axis(o, arg, state);
+    break;
+  case ARGP_KEY_END:
+    if (o->repair != (o->out != NULL)) argp_error(state, "--repair and -o belong together");
+    break;
+  default:
+    return ARGP_ERR_UNKNOWN;
+  }
+  return 0;
+}
+
+static const struct argp_child children[] = {{&source_argp, 0, NULL, 0}, {0}};
+static const struct argp argp = {
+    option_table,
+    parse_option,
+    "ELEMENT.mat\nK-FILE M-FILE [NODES]\nBOTH-FILE [NODES]",
+    "Examines an element: digits, symmetry, rigid motions, places of the frames, units, mass.\v"
+    "Exit code 0: it is sound, or has been repaired; 1: it is not. Repairs are in "
+    "docs/parts-import.md; nothing is changed without --repair.",
+    children,
+    NULL,
+    NULL};
+
+// ---- states of the element ----------------------------------------------------------------------
+
+typedef struct stage {
+  const char *name;
+  bool known;
+  pb_diagnosis d;
+  pb_element_held held;
+} stage;
+
+typedef struct visit {
+  const options *o;
+  loaded from;
+  pb_element_data cured;
+  size_t stages;
+  stage stage[3];
+} visit;
+
+static void default_axis(const options *o, const pb_element_data *e, double axis[3]) {
+  double norm = 0;
+  memcpy(axis, o->axis, 3 * sizeof *axis);
+  if (o->has_axis) return;
+  for (size_t a = 0; a < 3; a++) {
+    axis[a] = e->position[3 * o->tip + a] - e->position[3 * o->base + a];
+    norm += axis[a] * axis[a];
+  }
+  norm = sqrt(norm);
+  for (size_t a = 0; a < 3; a++) axis[a] = norm > 0 ? axis[a] / norm : a == 2;
+}
+
+static pb_status add_stage(visit *v, const char *name, const pb_element_data *e, pb_error *err) {
+  stage *s = &v->stage[v->stages++];
+  s->name = name;
+  s->held = (pb_element_held){{NAN, NAN, NAN, NAN}, NAN};
+  pb_status st = pb_element_diagnose(v->o->in.file[0], e, &v->o->doctor, &s->d, NULL, err);
+  if (st || v->o->tip >= e->frames || v->o->base >= e->frames) return st;
+  double axis[3];
+  default_axis(v->o, e, axis);
+  st = pb_element_hold(name, e, v->o->base, v->o->tip, axis, &s->held, err);
+  return st == PB_ERR_ELEMENT ? PB_OK : st;  // M is not definite: the findings say so
+}
+
+static bool all_curable(const pb_diagnosis *d) {
+  for (size_t k = 0; k < d->findings; k++)
+    if (!d->finding[k].curable) return false;
+  return true;
+}
+
+// Cures and looks again; both ways of the projection where one is needed.
+static pb_status add_cures(visit *v, pb_error *err) {
+  const pb_element_data *e = &v->from.import.element;
+  pb_status st = PB_OK;
+  for (int k = 0; !st && k < 2; k++) {
+    pb_doctor_options way = v->o->doctor;
+    way.weighted = k == 0 ? way.weighted : !way.weighted;
+    bool projected = v->stage[0].d.change > 0;
+    if (k && !projected) break;
+    pb_element_data *cured = k ? &(pb_element_data){0} : &v->cured;
+    pb_diagnosis d;
+    st = pb_element_diagnose(v->o->in.file[0], e, &way, &d, cured, err);
+    const char *name = !projected ? "repaired" : way.weighted ? "weighted" : "projected";
+    if (!st) st = add_stage(v, name, cured, err);
+    if (k) pb_element_data_clear(cured);
+  }
+  return st;
+}
+
+static pb_status examine(visit *v, pb_error *err) {
+  pb_status st = source_load(&v->o->in, &v->from, err);
+  if (!st) st = add_stage(v, "as it is", &v->from.import.element, err);
+  const pb_diagnosis *d = &v->stage[0].d;
+  if (!st && d->findings && all_curable(d)) st = add_cures(v, err);
+  return st;
+}
+
+// ---- text ---------------------------------------------------------------------------------------
+
+static void row_of_counts(pb_table *t, const visit *v, const char *name,
+                          double (*of)(const stage *)) {
+  pb_table_text(t, name);
+  for (size_t k = 0; k < v->stages; k++) pb_table_count(t, (size_t)of(&v->stage[k]));
+}
+
+static void row(pb_table *t, const visit *v, const char *name, double (*of)(const stage *)) {
+  pb_table_text(t, name);
+  for (size_t k = 0; k < v->stages; k++) pb_table_number(t, of(&v->stage[k]));
+}
+
+static double digits_k(const stage *s) {
+  return s->d.digits_k;
+}
+static double digits_m(const stage *s) {
+  return s->d.digits_m;
+}
+static double asymmetry(const stage *s) {
+  return fmax(s->d.asymmetry_k, s->d.asymmetry_m);
+}
+static double translation(const stage *s) {
+  return s->d.translation_residual;
+}
+static double rotation(const stage *s) {
+  return s->d.rotation_residual;
+}
+static double rigid(const stage *s) {
+  return s->d.rigid_hz[5];
+}
+static double flexible(const stage *s) {
+  return s->d.flexible_hz;
+}
+static double mass(const stage *s) {
+  return s->d.mass;
+}
+static double held_1(const stage *s) {
+  return s->held.hz[0];
+}
+static double held_2(const stage *s) {
+  return s->held.hz[1];
+}
+static double axial(const stage *s) {
+  return s->held.axial_hz;
+}
+
+static double lowest(const stage *s) {
+  double least = s->d.rigid_hz[0];
+  for (int k = 1; k < 6; k++) least = fmin(least, s->d.rigid_hz[k]);
+  return least;
+}
+
+static pb_status print_table(const visit *v, pb_error *err) {
+  pb_table t = {0};
+  char held[64];
+  pb_table_text_column(&t, "");
+  for (size_t k = 0; k < v->stages; k++) pb_table_number_column(&t, v->stage[k].name, NULL, 5);
+  row_of_counts(&t, v, "significant digits of K", digits_k);
+  row_of_counts(&t, v, "significant digits of M", digits_m);
+  row(&t, v, "asymmetry", asymmetry);
+  row(&t, v, "K against translations", translation);
+  row(&t, v, "K against rotations", rotation);
+  row(&t, v, "rigid motions, largest [Hz]", rigid);
+  row(&t, v, "rigid motions, lowest [Hz]", lowest);
+  row(&t, v, "first flexible mode, free [Hz]", flexible);
+  snprintf(held, sizeof held, "frame %zu held: mode 1 [Hz]", v->o->base + 1);
+  row(&t, v, held, held_1);
+  snprintf(held, sizeof held, "frame %zu held: mode 2 [Hz]", v->o->base + 1);
+  row(&t, v, held, held_2);
+  row(&t, v, "axial mode [Hz]", axial);
+  row(&t, v, "mass [kg]", mass);
+  pb_status st = pb_table_print(&t, stdout, 0, err);
+  pb_table_free(&t);
+  return st;
+}
+
+static pb_status print_text(const visit *v, pb_error *err) {
+  const pb_diagnosis *d = &v->stage[0].d;
+  printf("%s: %zu frames, %zu modes\n\n", v->o->in.file[0], d->frames, d->size - 6 * d->frames);
+  pb_status st = print_table(v, err);
+  putchar('\n');
+  for (size_t k = 0; k < d->findings; k++)
+    printf("%s: %s\n    %s%s\n", pb_finding_name(d->finding[k].code), d->finding[k].saw,
+           !d->finding[k].curable ? ""
+           : v->o->repair         ? "repair "
+                                  : "--repair ",
+           d->finding[k].would);
+  if (!d->findings) puts("sound: nothing to repair");
+  if (v->stages == 3 && !v->o->doctor.weighted)
+    puts("'weighted' is what --weighted would make of it.");
+  if (v->o->repair && v->cured.k) printf("written to %s\n", v->o->out);
+  return st;
+}
+
+// ---- JSON ---------------------------------------------------------------------------------------
+
+static void stage_json(pb_jsonout *json, const stage *s) {
+  pb_jsonout_object(json, NULL);
+  pb_jsonout_text(json, "state", s->name);
+  pb_jsonout_integer(json, "digits_k", (uint64_t)s->d.digits_k);
+  pb_jsonout_integer(json, "digits_m", (uint64_t)s->d.digits_m);
+  pb_jsonout_number(json, "asymmetry_k", s->d.asymmetry_k);
+  pb_jsonout_number(json, "asymmetry_m", s->d.asymmetry_m);
+  pb_jsonout_number(json, "translation_residual", s->d.translation_residual);
+  pb_jsonout_number(json, "rotation_residual", s->d.rotation_residual);
+  pb_jsonout_number(json, "mass_smallest_eigenvalue", s->d.mass_smallest);
+  pb_jsonout_numbers(json, "rigid_hz", s->d.rigid_hz, 6);
+  pb_jsonout_number(json, "flexible_hz", s->d.flexible_hz);
+  pb_jsonout_numbers(json, "held_hz", s->held.hz, 4);
+  pb_jsonout_number(json, "axial_hz", s->held.axial_hz);
+  pb_jsonout_number(json, "mass", s->d.mass);
+  pb_jsonout_object_end(json);
+}
+
+static void print_json(const visit *v) {
+  const pb_diagnosis *d = &v->stage[0].d;
+  pb_jsonout json;
+  pb_jsonout_begin(&json, stdout);
+  pb_jsonout_object(&json, NULL);
+  pb_jsonout_text(&json, "file", v->o->in.file[0]);
+  pb_jsonout_boolean(&json, "sound", !d->findings);
+  pb_jsonout_boolean(&json, "curable", all_curable(d));
+  pb_jsonout_boolean(&json, "repaired", v->o->repair && v->cured.k);
+  pb_jsonout_number(&json, "change", d->change);
+  pb_jsonout_array(&json, "findings");
+  for (size_t k = 0; k < d->findings; k++) {
+    pb_jsonout_object(&json, NULL);
+    pb_jsonout_text(&json, "finding", pb_finding_name(d->finding[k].code));
+    pb_jsonout_boolean(&json, "curable", d->finding[k].curable);
+    pb_jsonout_text(&json, "saw", d->finding[k].saw);
+    pb_jsonout_text(&json, "would", d->finding[k].would);
+    pb_jsonout_object_end(&json);
+  }
+  pb_jsonout_array_end(&json);
+  pb_jsonout_array(&json, "states");
+  for (size_t k = 0; k < v->stages; k++) stage_json(&json, &v->stage[k]);
+  pb_jsonout_array_end(&json);
+  pb_jsonout_object_end(&json);
+  pb_jsonout_end(&json);
+}
+
+// ---- writing ------------------------------------------------------------------------------------
+
+static pb_status write_cured(const visit *v, pb_error *err) {
+  const pb_diagnosis *d = &v->stage[0].d;
+  const pb_element_data *e = v->cured.k ? &v->cured : &v->from.import.element;
+  char *from = source_provenance(&v->o->in, &v->from);
+  pb_text text = {0};
+  if (!all_curable(d)) {
+    free(from);
+    return pb_fail(err, PB_ERR_ELEMENT, v->o->in.file[0], "cannot be repaired; nothing is written");
+  }
+  pb_text_append(&text, from ? from : "");
+  for (size_t k = 0; k < d->findings; k++)
+    pb_text_format(&text, "repaired: %s (%s)\n", d->finding[k].saw, d->finding[k].would);
+  pb_status st = from && !text.failed ? PB_OK : pb_fail_memory(err, v->o->out);
+  const pb_element_out out = {.name = "repaired element",
+                              .frames = e->frames,
+                              .size = e->size,
+                              .position = e->position,
+                              .k = e->k,
+                              .m = e->m,
+                              .provenance = text.text};
+  if (!st) st = pb_element_write(&out, v->o->out, PB_ELEMENT_BY_SUFFIX, err);
+  free(from);
+  free(text.text);
+  return st;
+}
+
+int part_doctor(int argc, char **argv) {
+  options o = {.base = 0, .tip = 1};
+  pb_error err = {0};
+  source_begin(&o.in);
+  pb_options_parse(&argp, argc, argv, &o);
+  visit v = {.o = &o};
+  pb_status st = examine(&v, &err);
+  if (!st && o.json) print_json(&v);
+  if (!st && !o.json) st = print_text(&v, &err);
+  if (!st && o.repair) st = write_cured(&v, &err);
+  if (st) pb_print_error(stderr, &err);
+  bool sound = !st && (o.repair || !v.stage[0].d.findings);
+  pb_element_data_clear(&v.cured);
+  source_unload(&v.from);
+  source_clear(&o.in);
+  return sound ? PB_EXIT_DONE : PB_EXIT_FAILED;
+}
