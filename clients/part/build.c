@@ -33,7 +33,7 @@ static const struct argp_option option_table[] = {
     {"set", KEY_SET, "/POINTER=VALUE", 0, "Change a value of the part file; may be repeated", 2},
     {"sweep", KEY_SWEEP, "/POINTER=V,V,...", 0, "A table of characteristics over these values", 3},
     {"convergence", KEY_CONVERGENCE, "N,N,...", OPTION_ARG_OPTIONAL,
-     "A table of characteristics over densities of the mesh (default 0.5,0.75,1,1.5,2)", 3},
+     "A table of characteristics over densities of the mesh (default 0.5,0.75,1,1.5)", 3},
     {"plot", KEY_PLOT, "FILE.png", 0, "Plot the table of --sweep or --convergence", 3},
     {"picture", KEY_PICTURE, "FILE", 0, "Draw the meshed part: .svg or .png", 4},
     {"picture-mode", KEY_PICTURE_MODE, "K", 0,
@@ -62,7 +62,7 @@ static void add_set(build_options *o, const char *pointer, const char *value,
 
 static void parse_densities(build_options *o, const char *arg, struct argp_state *state) {
   free(o->density);
-  pb_option_double_list(state, "--convergence", arg ? arg : "0.5,0.75,1,1.5,2", &o->density,
+  pb_option_double_list(state, "--convergence", arg ? arg : "0.5,0.75,1,1.5", &o->density,
                         &o->densities);
 }
 

@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 
 #include "base/json.h"
+#include "model/model.h"
 #include "part/characteristics.h"
 #include "plant/element.h"
 #include "support/check.h"
@@ -205,6 +206,65 @@ static void test_rigid_tie(void **state) {
   pb_reduction_free(rigid);
 }
 
+// ---- shipped plants of these elements
+// ------------------------------------------------------------
+
+static pb_model *load_plant(const char *name, size_t states) {
+  char path[512];
+  pb_warnings warnings = {0};
+  pb_model *model = NULL;
+  snprintf(path, sizeof path, "%s/plants/%s.json", PB_CONFIG, name);
+  REQUIRE(pb_model_load(path, &warnings, &model, &err));
+  assert_int_equal(warnings.count, 0);
+  assert_int_equal(model->nx, states);
+  return model;
+}
+
+// The lowest frequency among a plant's poles, Hz.
+static double first_hz(const pb_model *model) {
+  double complex *pole = malloc(model->nx * sizeof *pole);
+  double lowest = INFINITY;
+  assert_non_null(pole);
+  REQUIRE(pb_model_poles(model, PB_CONTINUOUS, pole, &err));
+  for (size_t i = 0; i < model->nx; i++) {
+    assert_true(creal(pole[i]) < 0);
+    lowest = fmin(lowest, cabs(pole[i]) / two_pi);
+  }
+  free(pole);
+  return lowest;
+}
+
+// Against what the element from Ansys gives with the same load (published: pole 93.92 Hz, y/V_a
+// 1.048 µm/V), and the APA95ML's load on its own stiffness.
+static void test_benches(void **state) {
+  (void)state;
+  pb_model *model = load_plant("apa300ml-bench-element", 122);
+  double gain[4];
+  assert_true(model->nu == 2 && model->ny == 2);
+  ASSERT_RELATIVE(first_hz(model), 93.92, 0.015);
+  REQUIRE(pb_model_dc(model, gain, &err));
+  ASSERT_RELATIVE(gain[2], 1.048e-6, 0.015);  // row of y, column of Va
+  pb_model_free(model);
+  model = load_plant("apa95ml-bench", 122);
+  double stiffness = value_of(apa95ml.value, apa95ml.count, "axial_stiffness");
+  // Guided: a little stiffer than with its top free to tilt; half of its mass moves along.
+  ASSERT_RELATIVE(first_hz(model), sqrt(stiffness / (5.7 + 0.5 * 0.156)) / two_pi, 0.03);
+  pb_model_free(model);
+}
+
+static void test_hexapod(void **state) {
+  (void)state;
+  pb_model *model = load_plant("nano-hexapod-element-joints", 252);
+  double soft = first_hz(model);
+  pb_model_free(model);
+  char path[512];
+  pb_model *simple = NULL;  // joints of the same stiffnesses
+  snprintf(path, sizeof path, "%s/plants/nano-hexapod.json", PB_CONFIG);
+  REQUIRE(pb_model_load(path, NULL, &simple, &err));
+  ASSERT_RELATIVE(soft, first_hz(simple), 0.05);
+  pb_model_free(simple);
+}
+
 static int set_up(void **state) {
   (void)state;
   build("apa300ml", &apa300ml);
@@ -227,6 +287,7 @@ int main(void) {
       cmocka_unit_test(test_joint),         cmocka_unit_test(test_apa300ml_outside),
       cmocka_unit_test(test_joint_outside), cmocka_unit_test(test_joint_ends),
       cmocka_unit_test(test_rigid_motions), cmocka_unit_test(test_rigid_tie),
+      cmocka_unit_test(test_benches),       cmocka_unit_test(test_hexapod),
   };
   return cmocka_run_group_tests(tests, set_up, tear_down);
 }
