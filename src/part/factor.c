@@ -6,9 +6,10 @@
 #include <string.h>
 #include <sys/mman.h>
 
+#include "part/factor_internal.h"
 #include "part/supersolve.h"
 
-static pb_status fail_cholmod(const pb_factor *f, pb_error *err) {
+pb_status factor_fail(const pb_factor *f, pb_error *err) {
   if (f->common.status == CHOLMOD_OUT_OF_MEMORY) return pb_fail_memory(err, "stiffness");
   return pb_fail(err, PB_ERR_NUMERIC, "stiffness", "CHOLMOD reports status %d", f->common.status);
 }
@@ -40,131 +41,6 @@ size_t pb_factor_entries(const pb_factor *f) {
 }
 
 // ---- order --------------------------------------------------------------------------------------
-
-// Vertices of the graph are the nodes that have rows left.
-typedef struct graph {
-  size_t vertices;
-  size_t *node;     // [vertices]
-  int64_t *vertex;  // [nodes] −1: all its rows are held
-  pb_sparse edge;   // pattern
-} graph;
-
-static void clear_graph(graph *g) {
-  free(g->node);
-  free(g->vertex);
-  pb_sparse_clear(&g->edge);
-}
-
-static pb_status number_vertices(size_t nodes, const int64_t *dof, const bool *held, graph *g,
-                                 pb_error *err) {
-  g->node = malloc((nodes + 1) * sizeof *g->node);
-  g->vertex = malloc((nodes + 1) * sizeof *g->vertex);
-  if (!g->node || !g->vertex) return pb_fail_memory(err, "stiffness");
-  for (size_t i = 0; i < nodes; i++) {
-    bool left = false;
-    for (size_t d = 0; d < 3; d++) left |= dof[d + 3 * i] >= 0 && !held[dof[d + 3 * i]];
-    g->vertex[i] = left ? (int64_t)g->vertices : -1;
-    if (left) g->node[g->vertices++] = i;
-  }
-  return PB_OK;
-}
-
-// The vertices that node v's columns reach, each once; a marker keeps them single. Returns how many
-// there are; `to` may be NULL for counting only.
-static size_t list_neighbours(const pb_sparse *a, const int64_t *dof, const int64_t *vertex_of_row,
-                              const graph *g, size_t v, int64_t *mark, int64_t stamp, int64_t *to) {
-  size_t count = 0;
-  for (size_t d = 0; d < 3; d++) {
-    int64_t r = dof[d + 3 * g->node[v]];
-    if (r < 0) continue;
-    for (int64_t at = a->start[r]; at < a->start[r + 1]; at++) {
-      int64_t other = vertex_of_row[a->row[at]];
-      if (other < 0 || mark[other] == stamp) continue;
-      mark[other] = stamp;
-      if (to) to[count] = other;
-      count++;
-    }
-  }
-  return count;
-}
-
-static pb_status connect_vertices(const pb_sparse *a, const int64_t *dof,
-                                  const int64_t *vertex_of_row, graph *g, pb_error *err) {
-  size_t count = 0, used = 0;
-  int64_t *mark = calloc(g->vertices + 1, sizeof *mark), *row = NULL, *col = NULL;
-  double *none = NULL;
-  pb_status st = PB_OK;
-  if (mark) {
-    for (size_t v = 0; v < g->vertices; v++)
-      count += list_neighbours(a, dof, vertex_of_row, g, v, mark, (int64_t)v + 1, NULL);
-    row = malloc((count + 1) * sizeof *row);
-    col = malloc((count + 1) * sizeof *col);
-    none = calloc(count + 1, sizeof *none);
-  }
-  if (!mark || !row || !col || !none) {
-    st = pb_fail_memory(err, "stiffness");
-    goto done;
-  }
-  for (size_t v = 0; v < g->vertices; v++) {
-    int64_t stamp = (int64_t)(g->vertices + v) + 1;
-    size_t found = list_neighbours(a, dof, vertex_of_row, g, v, mark, stamp, row + used);
-    for (size_t k = 0; k < found; k++) col[used + k] = (int64_t)v;
-    used += found;
-  }
-  st = pb_sparse_from_entries(g->vertices, count, row, col, none, &g->edge, err);
-done:
-  free(mark);
-  free(row);
-  free(col);
-  free(none);
-  return st;
-}
-
-static pb_status build_graph(const pb_sparse *a, size_t nodes, const int64_t *dof, const bool *held,
-                             graph *g, pb_error *err) {
-  pb_status st = number_vertices(nodes, dof, held, g, err);
-  if (st) return st;
-  int64_t *vertex_of_row = malloc((a->n + 1) * sizeof *vertex_of_row);
-  if (!vertex_of_row) return pb_fail_memory(err, "stiffness");
-  for (size_t i = 0; i < a->n; i++) vertex_of_row[i] = -1;
-  for (size_t i = 0; i < nodes; i++)
-    for (size_t d = 0; d < 3; d++)
-      if (dof[d + 3 * i] >= 0) vertex_of_row[dof[d + 3 * i]] = g->vertex[i];
-  st = connect_vertices(a, dof, vertex_of_row, g, err);
-  free(vertex_of_row);
-  return st;
-}
-
-// Nested dissection of the graph: sequence [vertices].
-static pb_status dissect(pb_factor *f, graph *g, int64_t *sequence, pb_error *err) {
-  cholmod_sparse edges = {.nrow = g->vertices,
-                          .ncol = g->vertices,
-                          .nzmax = (size_t)g->edge.start[g->vertices],
-                          .p = g->edge.start,
-                          .i = g->edge.row,
-                          .stype = 1,
-                          .itype = CHOLMOD_LONG,
-                          .xtype = CHOLMOD_PATTERN,
-                          .dtype = CHOLMOD_DOUBLE,
-                          .sorted = true,
-                          .packed = true};
-  bool ok = cholmod_l_metis(&edges, NULL, 0, true, sequence, &f->common);
-  return ok && f->common.status >= 0 ? PB_OK : fail_cholmod(f, err);
-}
-
-static void number_rows(pb_factor *f, const graph *g, const int64_t *sequence, const int64_t *dof,
-                        const bool *held) {
-  f->n = 0;
-  for (size_t i = 0; i < f->rows; i++) f->place[i] = -1;
-  for (size_t v = 0; v < g->vertices; v++) {
-    for (size_t d = 0; d < 3; d++) {
-      int64_t r = dof[d + 3 * g->node[sequence[v]]];
-      if (r < 0 || held[r]) continue;
-      f->place[r] = (int64_t)f->n;
-      f->row[f->n++] = (size_t)r;
-    }
-  }
-}
 
 // The lower triangle of `a` in the order of elimination, with values or as a pattern.
 static cholmod_sparse *permute(pb_factor *f, const pb_sparse *a, bool values) {
@@ -207,7 +83,7 @@ static pb_status analyse(pb_factor *f, const pb_sparse *a, pb_error *err) {
   cholmod_sparse *pattern = permute(f, a, false);
   if (pattern) f->l = cholmod_l_analyze(pattern, &f->common);
   cholmod_l_free_sparse(&pattern, &f->common);
-  if (!f->l) return fail_cholmod(f, err);
+  if (!f->l) return factor_fail(f, err);
   if (!f->l->is_super)
     return pb_fail(err, PB_ERR_NUMERIC, "stiffness", "CHOLMOD is not supernodal");
   size_t *row = malloc((f->n + 1) * sizeof *row);
@@ -230,20 +106,11 @@ static pb_status analyse(pb_factor *f, const pb_sparse *a, pb_error *err) {
 pb_status pb_factor_order(const pb_sparse *a, size_t nodes, const int64_t *dof, const bool *held,
                           pb_factor *f, pb_error *err) {
   *f = (pb_factor){.rows = a->n};
-  graph g = {0};
-  int64_t *sequence = NULL;
   start(f);
   f->place = malloc((a->n + 1) * sizeof *f->place);
   f->row = malloc((a->n + 1) * sizeof *f->row);
   pb_status st = f->place && f->row ? PB_OK : pb_fail_memory(err, "stiffness");
-  if (!st) st = build_graph(a, nodes, dof, held, &g, err);
-  if (!st) {
-    sequence = malloc((g.vertices + 1) * sizeof *sequence);
-    st = sequence ? dissect(f, &g, sequence, err) : pb_fail_memory(err, "stiffness");
-  }
-  if (!st) number_rows(f, &g, sequence, dof, held);
-  clear_graph(&g);
-  free(sequence);
+  if (!st) st = factor_dissect(f, a, nodes, dof, held, err);
   return st ? st : analyse(f, a, err);
 }
 
@@ -297,7 +164,7 @@ pb_status pb_factor_numeric(pb_factor *f, const pb_sparse *a, size_t *weak, doub
   if (ok) use_large_pages(f->l->x, f->l->xsize * sizeof(double));
   ok = ok && cholmod_l_factorize(s, f->l, &f->common);
   cholmod_l_free_sparse(&s, &f->common);
-  if (!ok || f->common.status < 0) return fail_cholmod(f, err);
+  if (!ok || f->common.status < 0) return factor_fail(f, err);
   if (f->l->minor < f->n) {
     *weak = f->row[f->l->minor];
   } else {
@@ -348,7 +215,7 @@ static pb_status solve_wide(pb_factor *f, size_t columns, double *x, pb_error *e
   for (size_t c = 0; ok && c < columns; c++)
     for (size_t i = 0; i < f->n; i++) x[f->row[i] + c * f->rows] = y[i + c * f->n];
   free(y);
-  return ok ? PB_OK : fail_cholmod(f, err);
+  return ok ? PB_OK : factor_fail(f, err);
 }
 
 pb_status pb_factor_solve(pb_factor *f, size_t columns, double *x, pb_error *err) {

@@ -60,6 +60,13 @@ void reduce_average(const reduce_work *w, size_t columns, const double *u, doubl
 void reduce_spread(const reduce_work *w, size_t columns, const double *z, size_t ld, double *u);
 // u at the nodes of rigid frame f ← R e_d, added.
 void reduce_move_rigid(const reduce_work *w, size_t f, size_t d, double *u);
+// R of a point at x from the origin, 3 × 6 column-major: u = v + ω × x.
+void reduce_rigid_tie(const double x[3], double tie[18]);
+
+// reduce_pins.c: PB_ERR_SINGULAR where the part falls into pieces; w->pin and its entries of K
+// (none where a rigid frame holds the part).
+pb_status reduce_check_connected(const reduce_work *w, pb_error *err);
+pb_status reduce_choose_pins(reduce_work *w, pb_error *err);
 
 // reduce_mass.c: y ← M x.
 pb_status reduce_mass_detect(reduce_work *w, pb_error *err);

@@ -187,6 +187,24 @@ static void test_band(void **state) {
   }
 }
 
+// M may couple what K does not.
+static void test_mass_beyond(void **state) {
+  (void)state;
+  pb_fem fem;
+  assert_int_equal(truss_build(60, 0.35, true, 21, &fem), 0);
+  size_t low = 0, high = 0;
+  for (size_t i = 0; i < fem.nodes; i++) {
+    if (fem.xyz[3 * i] < fem.xyz[3 * low]) low = i;
+    if (fem.xyz[3 * i] > fem.xyz[3 * high]) high = i;
+  }
+  assert_int_equal(truss_couple(&fem, low, high, 0.5), 0);
+  assert_int_equal(truss_frame(&fem, "left", PB_TIE_AVERAGED, 0, 0, 0.3), 0);
+  assert_int_equal(truss_frame(&fem, "right", PB_TIE_AVERAGED, 0, 0.7, 1), 0);
+  check_against_dense(&fem, 8, "masses coupled beyond the springs");
+  check_band(&fem, "masses coupled beyond the springs");
+  pb_fem_clear(&fem);
+}
+
 // Forty equal resonators, each on a spring of its own: one frequency forty times, five times what a
 // block of the iteration can see at once. The count finds those that are missing.
 static void test_many_equal(void **state) {
@@ -344,12 +362,12 @@ static void test_square_bar(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_averaged),   cmocka_unit_test(test_rigid),
-      cmocka_unit_test(test_mixed),      cmocka_unit_test(test_no_modes),
-      cmocka_unit_test(test_all_modes),  cmocka_unit_test(test_band),
-      cmocka_unit_test(test_many_equal), cmocka_unit_test(test_refusals),
-      cmocka_unit_test(test_mechanisms), cmocka_unit_test(test_stop),
-      cmocka_unit_test(test_square_bar),
+      cmocka_unit_test(test_averaged),    cmocka_unit_test(test_rigid),
+      cmocka_unit_test(test_mixed),       cmocka_unit_test(test_no_modes),
+      cmocka_unit_test(test_all_modes),   cmocka_unit_test(test_band),
+      cmocka_unit_test(test_mass_beyond), cmocka_unit_test(test_many_equal),
+      cmocka_unit_test(test_refusals),    cmocka_unit_test(test_mechanisms),
+      cmocka_unit_test(test_stop),        cmocka_unit_test(test_square_bar),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

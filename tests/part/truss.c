@@ -137,6 +137,17 @@ int truss_hang(pb_fem *fem, size_t count, size_t node, double stiffness, double 
   return rebuild(fem, &k, &m);
 }
 
+int truss_couple(pb_fem *fem, size_t i, size_t j, double mass) {
+  entries k, m;
+  if (grow(fem, fem->nodes, &k, &m, 9)) return -1;
+  for (size_t a = 0; a < 3; a++) {
+    add(&m, 3 * i + a, 3 * i + a, mass);
+    add(&m, 3 * j + a, 3 * j + a, mass);
+    add(&m, 3 * i + a, 3 * j + a, mass / 2);
+  }
+  return rebuild(fem, &k, &m);
+}
+
 int truss_swing(pb_fem *fem) {
   entries k, m;
   size_t i = fem->nodes;

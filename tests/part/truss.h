@@ -22,6 +22,9 @@ void truss_drop_frame(pb_fem *fem);  // the last one
 // node.
 int truss_hang(pb_fem *fem, size_t count, size_t node, double stiffness, double mass);
 
+// Adds a mass coupling (kg) between two nodes, which no spring needs to connect.
+int truss_couple(pb_fem *fem, size_t i, size_t j, double mass);
+
 // Adds one node on a single spring.
 int truss_swing(pb_fem *fem);
 
