@@ -55,7 +55,11 @@ static pb_status read_mlist(pb_lines *in, pb_matrix_build *b) {
       pb_status st = add_row(b, in, node, direction);
       if (st) return st;
     } else {
+      int64_t node;
+      char *at = in->text;
       inside = false;
+      if (pb_scan_integer(&at, &node) && read_direction(&at) > 0 && pb_scan_done(at))
+        return pb_lines_fail(in, "a master without a header NODE DOF above it");
     }
   }
   return in->status;

@@ -85,6 +85,17 @@ static pb_status read_node(pb_lines *in, int numbers, const char *separators, no
   return add_node(list, number, value, in->err);
 }
 
+// A node number and coordinates alone on a line, as no line of a banner is.
+static bool looks_like_node(const char *text) {
+  char *at = (char *)text;
+  int64_t number;
+  double value;
+  int values = 0;
+  if (!pb_scan_integer(&at, &number)) return false;
+  while (pb_scan_real(&at, &value)) values++;
+  return values >= 3 && pb_scan_done(at);
+}
+
 static pb_status read_nlist(pb_lines *in, node_list *list) {
   int numbers = 0;  // > 0: within a page's rows
   while (pb_lines_next(in)) {
@@ -96,6 +107,8 @@ static pb_status read_nlist(pb_lines *in, node_list *list) {
       if (st) return st;
     } else {
       numbers = 0;
+      if (looks_like_node(in->text))
+        return pb_lines_fail(in, "a row of nodes without a header NODE X Y Z above it");
     }
   }
   return in->status;
