@@ -2,7 +2,8 @@
 // - KEEP_LAST writers never block on a reader that stopped; only requests, where each one counts,
 //   are kept all, and then the client is the one that may block.
 // - sample and command are ordered by reception: clocks of two hosts need not agree.
-// - reply is TRANSIENT_LOCAL: an answer survives a match that is completed late.
+// - reply and block_reply are TRANSIENT_LOCAL: an answer survives a match that is completed late.
+//   A client has one block on its way, so that one answer is kept for each.
 // - latency budgets stay 0: a positive one would hold a sample back until the next write.
 #include "bus_qos.h"
 
@@ -37,7 +38,7 @@ static const topic_row table[PB_TOPIC_COUNT] = {
     [PB_TOPIC_BLOCK_REQUEST] = {"plantbus/v1/block_request", &plantbus_BlockRequest_desc,
                                 DDS_DURABILITY_VOLATILE, 8, 0, 50, false, false},
     [PB_TOPIC_BLOCK_REPLY] = {"plantbus/v1/block_reply", &plantbus_BlockReply_desc,
-                              DDS_DURABILITY_VOLATILE, 8, 0, 50, false, false},
+                              DDS_DURABILITY_TRANSIENT_LOCAL, 1, 0, 50, false, false},
 };
 
 const char *pb_topic_name(pb_topic topic) {

@@ -124,9 +124,9 @@ static pb_status read_frame(frame_source *s, const cJSON *object, const char *na
 
 // Errors of the JSON readers point into the text: say which text.
 static pb_status name_source(pb_status st, const char *name, pb_error *err) {
-  if (!st || !err || err->where[0] != '/') return st;
+  if (!st || !err || (err->where[0] && err->where[0] != '/')) return st;
   char where[sizeof err->where];
-  snprintf(where, sizeof where, "%.120s: %.120s", name, err->where);
+  snprintf(where, sizeof where, "%.120s%s%.120s", name, err->where[0] ? ": " : "", err->where);
   memcpy(err->where, where, sizeof where);
   return st;
 }

@@ -238,19 +238,21 @@ pb_status pb_lti_delay(const pb_lti *lti, unsigned samples, pb_lti *out, pb_erro
   return status;
 }
 
+// out += M v, column after column: each sum in the order of its row, many rows at once.
+static void add_columns(size_t rows, size_t columns, const double *restrict m,
+                        const double *restrict v, double *restrict out) {
+  for (size_t k = 0; k < columns; k++, m += rows)
+    for (size_t r = 0; r < rows; r++) out[r] += m[r] * v[k];
+}
+
 void pb_lti_step(const pb_lti *lti, double *x, double *scratch, const double *u, double *y) {
   size_t nx = lti->nx, nu = lti->nu, ny = lti->ny;
-  for (size_t o = 0; o < ny; o++) {
-    double sum = 0;
-    for (size_t k = 0; k < nx; k++) sum += lti->c[o + k * ny] * x[k];
-    for (size_t i = 0; i < nu; i++) sum += lti->d[o + i * ny] * u[i];
-    y[o] = sum;
-  }
-  for (size_t r = 0; r < nx; r++) {
-    double sum = 0;
-    for (size_t k = 0; k < nx; k++) sum += lti->a[r + k * nx] * x[k];
-    for (size_t i = 0; i < nu; i++) sum += lti->b[r + i * nx] * u[i];
-    scratch[r] = sum;
-  }
-  if (nx > 0) memcpy(x, scratch, nx * sizeof *x);
+  memset(y, 0, ny * sizeof *y);
+  add_columns(ny, nx, lti->c, x, y);
+  add_columns(ny, nu, lti->d, u, y);
+  if (nx == 0) return;
+  memset(scratch, 0, nx * sizeof *x);
+  add_columns(nx, nx, lti->a, x, scratch);
+  add_columns(nx, nu, lti->b, u, scratch);
+  memcpy(x, scratch, nx * sizeof *x);
 }

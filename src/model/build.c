@@ -8,6 +8,7 @@
 #include "base/lapack.h"
 #include "base/text.h"
 #include "model/block.h"
+#include "model/step_kernel.h"
 
 static const double two_pi = 6.283185307179586476925286766559;
 
@@ -64,6 +65,7 @@ void pb_model_free(pb_model *m) {
   free(m->d);
   free(m->input_electronics);
   free(m->output_electronics);
+  pb_step_pack_free(m->step);
   free(m);
 }
 
@@ -251,6 +253,7 @@ static pb_status rebuild(const pb_model *m, double hz, pb_model **out, pb_error 
   }
   if (!st) st = pb_model_discretize(copy, err);
   if (!st) st = check_finite(copy, err);
+  if (!st) st = pb_step_pack_model(copy, err);
   free(order);
   if (st) {
     pb_model_free(copy);
@@ -281,6 +284,7 @@ pb_status pb_model_narrow(const pb_model *m, size_t nu, size_t ny, pb_model **ou
   for (size_t j = 0; j < m->nx; j++) memcpy(n->c + j * ny, m->c + j * m->ny, ny * sizeof(double));
   for (size_t i = 0; i < nu; i++) memcpy(n->d + i * ny, m->d + i * m->ny, ny * sizeof(double));
   pb_status st = copy_signals(m, n, err);
+  if (!st) st = pb_step_pack_model(n, err);
   if (st)
     pb_model_free(n);
   else

@@ -23,6 +23,7 @@
 #include "model/electronics.h"
 
 struct pb_system;
+struct pb_step_pack;
 
 typedef struct pb_signal {
   char *name;  // unique in its list
@@ -51,6 +52,8 @@ typedef struct pb_model {
   double *d;             // ny × nu
   pb_electronics *input_electronics;   // [nu], NULL: no input has any
   pb_electronics *output_electronics;  // [ny], NULL: no output has any
+  struct pb_step_pack *step;           // A_d, B_d, C, D laid out for stepping (step_kernel.h);
+                                       // NULL: stepped from the arrays above
 } pb_model;
 
 // Everything that affects the next output, flat: copying pb_state_bytes() bytes is a snapshot.

@@ -10,6 +10,7 @@
 
 #include "base/text.h"
 #include "model/build.h"
+#include "model/step_kernel.h"
 
 static const double magic = 1886351986;  // "pb" and a layout version
 enum { HEADER = 11, SIZES = 8, LARGEST = 100000, ELECTRONICS = 8 };
@@ -161,7 +162,8 @@ static pb_status fill(const double *data, pb_model *m, size_t values, pb_error *
   take(&at, m->d, m->ny * m->nu);
   if (data[9] != 0) st = take_electronics(&at, m->nu, true, &m->input_electronics, err);
   if (!st && data[10] != 0) st = take_electronics(&at, m->ny, false, &m->output_electronics, err);
-  return st ? st : pb_model_discretize(m, err);
+  if (!st) st = pb_model_discretize(m, err);
+  return st ? st : pb_step_pack_model(m, err);
 }
 
 static bool name_signals(pb_signal *signal, size_t count, const char *const *name,

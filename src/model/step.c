@@ -4,6 +4,7 @@
 
 #include "model/model.h"
 #include "model/step_internal.h"
+#include "model/step_kernel.h"
 
 static bool has_electronics(const pb_model *m) {
   return m->input_electronics || m->output_electronics;
@@ -32,6 +33,10 @@ void pb_state_reset(const pb_model *m, pb_state *s) {
 }
 
 void pb_step_motion(const pb_model *m, const pb_state *s, double *y) {
+  if (m->step) {
+    m->step->kernel->output(m->step, s->data, y);
+    return;
+  }
   const double *x = s->data, *u = s->data + m->nx;
   size_t ny = m->ny;
   for (size_t o = 0; o < ny; o++) y[o] = 0;
@@ -77,6 +82,27 @@ static void advance_block(const double *ad, size_t n, double *x, double *scratch
     for (size_t i = 0; i < n; i++) x[i] += ad[i + j * n] * scratch[j];
 }
 
+// x[from …] += B_d u.
+static void add_inputs(const pb_model *m, const double *u, size_t from, double *x) {
+  for (size_t i = 0; i < m->nu; i++) {
+    const double *b = m->bd + i * m->nx;
+    for (size_t j = from; j < m->nx; j++) x[j] += b[j] * u[i];
+  }
+}
+
+static void advance(const pb_model *m, double *x, const double *u, double *scratch) {
+  const size_t paired = 2 * m->pairs;
+  if (m->step)
+    m->step->kernel->advance(m->step, x, u);
+  else
+    advance_pairs(m->ad, x, m->pairs);
+  for (size_t k = m->pairs; k < m->blocks; k++) {
+    size_t start = m->block_start[k];
+    advance_block(m->ad + m->block_value[k], m->block_start[k + 1] - start, x + start, scratch);
+  }
+  add_inputs(m, u, m->step ? paired : 0, x);
+}
+
 void pb_step_advance(const pb_model *m, pb_state *s, const double *command) {
   double *x = s->data, *held = s->data + m->nx;
   const double *u = command;
@@ -84,18 +110,8 @@ void pb_step_advance(const pb_model *m, pb_state *s, const double *command) {
     pb_electronics_apply(m, s, command);
     u = held;
   }
-  advance_pairs(m->ad, x, m->pairs);
-  for (size_t k = m->pairs; k < m->blocks; k++) {
-    size_t start = m->block_start[k];
-    advance_block(m->ad + m->block_value[k], m->block_start[k + 1] - start, x + start,
-                  held + m->nu);
-  }
-  for (size_t i = 0; i < m->nu; i++) {
-    const double *b = m->bd + i * m->nx;
-    double ui = u[i];
-    held[i] = ui;
-    for (size_t j = 0; j < m->nx; j++) x[j] += b[j] * ui;
-  }
+  advance(m, x, u, held + m->nu);
+  for (size_t i = 0; i < m->nu; i++) held[i] = u[i];
   s->step++;
   if (m->output_electronics) pb_electronics_sample(m, s);
 }

@@ -49,11 +49,11 @@ static void test_matrix_market(void **state) {
 // first.
 static void test_sweep(void **state) {
   (void)state;
-  cJSON *json = part_json("build " JOINT
-                          " --mesh 0.5 --json --sweep /dimensions/neck=0.15e-3,0.25e-3,0.5e-3");
+  cJSON *json =
+      part_json("build " JOINT " --mesh 0.5 --json --sweep /dimensions/neck=0.25e-3,0.5e-3");
   const cJSON *rows = cJSON_GetObjectItem(json, "rows");
-  assert_int_equal(cJSON_GetArraySize(rows), 3);
-  const cJSON *thin = cJSON_GetArrayItem(rows, 1), *thick = cJSON_GetArrayItem(rows, 2);
+  assert_int_equal(cJSON_GetArraySize(rows), 2);
+  const cJSON *thin = cJSON_GetArrayItem(rows, 0), *thick = cJSON_GetArrayItem(rows, 1);
   ASSERT_RELATIVE(member(thin, "parameter", NULL), 0.25e-3, 1e-15);
   double bending =
       member(thick, "bending_stiffness", NULL) / member(thin, "bending_stiffness", NULL);
@@ -76,19 +76,15 @@ static void test_convergence(void **state) {
   cJSON_Delete(json);
 }
 
-static void test_table(void **state) {
-  (void)state;
-  assert_int_equal(part_run("build " JOINT " --mesh 0.5"), 0);
-  char *text = part_text("stdout");
-  assert_non_null(strstr(text, "bending_stiffness"));
-  assert_non_null(strstr(text, "published"));
-  free(text);
-}
-
-// The picture's polygons: one for each visible face of the surface, none outside the picture.
+// The table, and the picture's polygons: one for each visible face of the surface, none outside the
+// picture.
 static void test_picture(void **state) {
   (void)state;
   assert_int_equal(part_run("build " JOINT " --mesh 0.5 --picture rest.svg"), 0);
+  char *table = part_text("stdout");
+  assert_non_null(strstr(table, "bending_stiffness"));
+  assert_non_null(strstr(table, "published"));
+  free(table);
   assert_int_equal(part_run("build " JOINT " --mesh 0.5 --picture mode.svg --picture-mode 1"), 0);
   char *rest = part_text("rest.svg"), *mode = part_text("mode.svg");
   assert_string_equal(strstr(rest, "</svg>"), "</svg>\n");
@@ -204,7 +200,7 @@ static void compare_frequencies(void) {
   char *text = part_text("full/modes.dat"), *at = strstr(text, "MODE NO");
   assert_non_null(at);
   int compared = 0;
-  for (at = strchr(at, '\n'); at && compared < 8; at = strchr(at + 1, '\n')) {
+  for (at = strchr(at, '\n'); at && compared < 6; at = strchr(at + 1, '\n')) {
     int mode;
     double eigenvalue, rad, hz;
     if (sscanf(at + 1, "%d %lf %lf %lf", &mode, &eigenvalue, &rad, &hz) != 4 || mode <= 6) continue;
@@ -212,7 +208,7 @@ static void compare_frequencies(void) {
     ASSERT_RELATIVE(ours, hz, 1e-3);
     compared++;
   }
-  assert_int_equal(compared, 8);
+  assert_int_equal(compared, 6);
   free(text);
   pb_element_free(element);
 }
@@ -223,7 +219,7 @@ static void test_calculix(void **state) {
     print_message("skipped: CalculiX (ccx) is not installed\n");
     skip();
   }
-  assert_int_equal(part_run("build " JOINT " --mesh 0.5 --modes 80 --full full -o many.mat"), 0);
+  assert_int_equal(part_run("build " JOINT " --mesh 0.5 --modes 40 --full full -o many.mat"), 0);
   assert_int_equal(part_shell("cd full && ccx part && ccx modes"), 0);
   compare_matrices();
   compare_frequencies();
@@ -289,12 +285,17 @@ static void test_bracket(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_element),       cmocka_unit_test(test_matrix_market),
-      cmocka_unit_test(test_sweep),         cmocka_unit_test(test_convergence),
-      cmocka_unit_test(test_table),         cmocka_unit_test(test_picture),
-      cmocka_unit_test(test_png),           cmocka_unit_test(test_messages),
-      cmocka_unit_test(test_calculix),      cmocka_unit_test(test_calculix_actuator),
-      cmocka_unit_test(test_full_and_back), cmocka_unit_test(test_bracket),
+      cmocka_unit_test(test_element),
+      cmocka_unit_test(test_matrix_market),
+      cmocka_unit_test(test_sweep),
+      cmocka_unit_test(test_convergence),
+      cmocka_unit_test(test_picture),
+      cmocka_unit_test(test_png),
+      cmocka_unit_test(test_messages),
+      cmocka_unit_test(test_calculix),
+      cmocka_unit_test(test_calculix_actuator),
+      cmocka_unit_test(test_full_and_back),
+      cmocka_unit_test(test_bracket),
   };
   return cmocka_run_group_tests(tests, part_folder_make, part_folder_remove);
 }

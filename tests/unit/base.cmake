@@ -4,5 +4,6 @@ pb_test(unit_element LABELS unit SOURCES test_element.c ../support/beam.c LIBS P
 pb_test(unit_assembly LABELS unit SOURCES test_assembly.c ../support/beam.c LIBS PkgConfig::MATIO)
 pb_test(unit_model LABELS unit SOURCES test_model.c)
 pb_test(unit_electronics LABELS unit SOURCES test_electronics.c)
+pb_test(unit_step_kernel LABELS unit SOURCES test_step_kernel.c)
 add_test(NAME unit_purity COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/test_purity.sh ${PROJECT_SOURCE_DIR})
 set_tests_properties(unit_purity PROPERTIES LABELS unit)

@@ -26,7 +26,7 @@ static inline pb_model *test_model(const test_mode *mode, size_t modes, size_t n
   m->name = pb_text_copy("test");
   m->sample_rate = sample_rate;
   for (size_t i = 0; i < nu + ny; i++) {
-    char name[16];
+    char name[32];
     pb_signal *s = i < nu ? &m->input[i] : &m->output[i - nu];
     snprintf(name, sizeof name, "%c%zu", i < nu ? 'u' : 'y', i < nu ? i + 1 : i - nu + 1);
     s->name = pb_text_copy(name);

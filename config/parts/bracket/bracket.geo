@@ -1,7 +1,7 @@
 // An L-shaped bracket with a round hole in each leg (mm). Frames: the walls of the two holes.
 SetFactory("OpenCASCADE");
-Mesh.MeshSizeMin = 3;
-Mesh.MeshSizeMax = 3;
+Mesh.MeshSizeMin = 4;
+Mesh.MeshSizeMax = 4;
 Mesh.ElementOrder = 2;
 Mesh.SecondOrderLinear = 0;
 Mesh.SaveGroupsOfNodes = 1;  // node sets of the physical surfaces
