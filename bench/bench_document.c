@@ -86,10 +86,10 @@ static void put_table(FILE *out, const cJSON *table) {
   fputc('\n', out);
 }
 
-static void put_goal(FILE *out, const char *bench, const cJSON *goal) {
+static void put_goal(FILE *out, const char *program, const cJSON *goal) {
   const char *unit = bench_json_text(goal, "unit");
   const bool met = cJSON_IsTrue(pb_json_member(goal, "met"));
-  fprintf(out, "| %s | %s | %.3g %s | %s %.3g | %s%s |\n", bench, bench_json_text(goal, "what"),
+  fprintf(out, "| %s | %s | %.3g %s | %s %.3g | %s%s |\n", program, bench_json_text(goal, "what"),
           bench_json_number(goal, "measured"), unit, bench_json_text(goal, "relation"),
           bench_json_number(goal, "goal"), met ? "met" : "**missed**",
           cJSON_IsTrue(pb_json_member(goal, "judged")) ? "" : " (told only)");

@@ -96,6 +96,10 @@ void pb_matfile_real(pb_matfile *mat, const char *name, size_t rows, size_t cols
 // Splits `count` complex numbers, the k-th at index order(k), into the two arrays that matio wants.
 static void put_complex(pb_matfile *mat, const char *name, int rank, size_t *dims, size_t count,
                         const double complex *data, size_t (*order)(size_t, const size_t *)) {
+  if (count == 0) {  // matio frees what it never allocated of an empty complex variable
+    pb_matfile_real(mat, name, dims[0], dims[1], NULL);
+    return;
+  }
   if (!may_write(mat, name, 16 * count)) return;
   double *part = malloc((2 * count + 1) * sizeof *part);
   if (!part) {

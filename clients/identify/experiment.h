@@ -118,6 +118,12 @@ const pb_experiment_trouble *pb_experiment_trouble_of(const pb_experiment *exper
 // Samples of one period or segment.
 size_t pb_experiment_period(const pb_experiment *experiment);
 
+// Where the samples of a round are measured: stage s from sample s·(settle + measure) + settle on.
+typedef struct pb_experiment_layout {
+  size_t stages, settle, measure;  // of the round under way, or of the next one
+} pb_experiment_layout;
+pb_experiment_layout pb_experiment_layout_of(const pb_experiment *experiment);
+
 // The callback, for tests that have no session.
 bool pb_experiment_on_sample(void *experiment, const pb_sample *sample, double *command);
 

@@ -16,6 +16,10 @@ uint64_t pb_experiment_round_steps(const pb_experiment *e) {
   return (uint64_t)e->stages * (settle_of_round(e) + e->measure);
 }
 
+pb_experiment_layout pb_experiment_layout_of(const pb_experiment *e) {
+  return (pb_experiment_layout){e->stages, settle_of_round(e), e->measure};
+}
+
 static pb_status check(const pb_experiment *e, pb_error *err) {
   const pb_experiment_options *o = &e->options;
   if (!(isfinite(o->resolution) && o->resolution > 0) || !(o->settle >= 0) ||

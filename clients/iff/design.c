@@ -77,7 +77,7 @@ static pb_status list_modes(iff_result *r, pb_error *err) {
                  r->experiment.f1, r->experiment.f2);
 }
 
-pb_status iff_design(iff_result *r, pb_error *err) {
+static pb_status design(iff_result *r, pb_error *err) {
   pb_status status = make_controller(r, err);
   if (status == PB_OK) status = choose_gain(r, err);
   if (status == PB_OK && r->law.gain <= 0) {
@@ -90,7 +90,18 @@ pb_status iff_design(iff_result *r, pb_error *err) {
   return status;
 }
 
-static void measurement_clear(iff_measurement *m) {
+pb_status iff_prepare(const iff_options *o, const pb_bench *bench, iff_result *r, pb_error *err) {
+  *r = (iff_result){.options = o, .bench = bench, .model = bench->model};
+  iff_experiment_defaults(o, r->model, &r->experiment);
+  pb_status status = iff_choose_loops(r->model, o, &r->loops, err);
+  r->output = malloc((r->model->ny + 1) * sizeof *r->output);
+  if (status == PB_OK && !r->output) status = pb_fail_memory(err, "outputs");
+  for (size_t k = 0; r->output && k < r->model->ny; k++) r->output[k] = k;
+  r->channels = (pb_experiment_channels){r->loops.input, r->output, r->loops.count, r->model->ny};
+  return status == PB_OK ? design(r, err) : status;
+}
+
+void iff_measurement_clear(iff_measurement *m) {
   pb_frf_clear(&m->frf);
   free(m->expected);
   pb_fit_clear(&m->fit);
@@ -98,8 +109,8 @@ static void measurement_clear(iff_measurement *m) {
 }
 
 void iff_result_clear(iff_result *r) {
-  measurement_clear(&r->open);
-  measurement_clear(&r->closed);
+  iff_measurement_clear(&r->open);
+  iff_measurement_clear(&r->closed);
   free(r->mode);
   pb_rootlocus_clear(&r->locus);
   pb_best_gain_clear(&r->best);
@@ -107,4 +118,6 @@ void iff_result_clear(iff_result *r) {
   pb_lti_free(&r->controller);
   pb_lti_free(&r->controller_used);
   iff_loops_clear(&r->loops);
+  free(r->output);
+  *r = (iff_result){0};
 }

@@ -159,12 +159,13 @@ static size_t best_witness(const iff_result *r, size_t i) {
 
 pb_status iff_plot(const iff_result *r, const char *dir, pb_error *err) {
   size_t most = r->closed.frf.nf > r->open.frf.nf ? r->closed.frf.nf : r->open.frf.nf;
-  double complex *work = malloc(3 * most * sizeof *work);
+  double complex *work = malloc((3 * most + 1) * sizeof *work);
   pb_status status = work ? plot_locus(r, dir, err) : pb_fail_memory(err, "plot");
-  for (size_t k = 0; k < r->loops.count && k < 6 && status == PB_OK; k++) {
+  bool measured = r->closed.frf.nf > 0;
+  for (size_t k = 0; measured && k < r->loops.count && k < 6 && status == PB_OK; k++) {
     status = plot_channel(r, r->loops.output[k], k, dir, work, err);
   }
-  if (status == PB_OK) {
+  if (status == PB_OK && measured) {
     size_t witness = best_witness(r, 0);
     if (witness < r->closed.frf.ny) status = plot_channel(r, witness, 0, dir, work, err);
   }

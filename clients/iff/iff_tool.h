@@ -1,4 +1,4 @@
-// plantbus-iff: what its files share.
+// Integral force feedback as the tools design and measure it: plantbus-iff, plantbus-control.
 #ifndef PB_IFF_TOOL_H
 #define PB_IFF_TOOL_H
 
@@ -25,6 +25,20 @@ typedef struct iff_options {
   bool json, plot;
 } iff_options;
 
+// All of the command line; its input is an iff_options. Positional arguments are the tool's.
+extern const struct argp iff_argp;
+void iff_options_default(iff_options *options);
+void iff_options_free(iff_options *options);
+
+// Values of the flags for the gain ("auto" or a number) and the corners, for other command lines.
+void iff_parse_gain(struct argp_state *state, const char *flag, const char *text, iff_options *o);
+void iff_parse_corners(struct argp_state *state, const char *flag, const char *text,
+                       iff_options *o);
+
+// Excitation with what was not given filled in; its band is the band of the modes. [any]
+void iff_experiment_defaults(const iff_options *options, const pb_model *model,
+                             pb_experiment_options *out);
+
 // The loops: output[k] of the model through K_IFF to input[k].
 typedef struct iff_loops {
   size_t count;
@@ -46,11 +60,18 @@ typedef struct iff_measurement {
   pb_run_report report;
 } iff_measurement;
 
+// Fills the agreement of a measured response with the expected one, over the outputs (of the
+// model's list) that the inputs move. [any]
+void iff_compare(const pb_signal *output, const pb_experiment_channels *channels,
+                 iff_measurement *measurement);
+void iff_measurement_clear(iff_measurement *measurement);
+
 typedef struct iff_result {
   const iff_options *options;
   const pb_bench *bench;
   const pb_model *model;
   iff_loops loops;
+  size_t *output;                    // [ny] all outputs of the model
   pb_experiment_channels channels;   // inputs of the loops, all outputs
   pb_experiment_options experiment;  // as run, defaults filled in
   pb_iff law;                        // with the gain that was used
@@ -75,11 +96,17 @@ pb_status iff_choose_loops(const pb_model *model, const iff_options *options, if
                            pb_error *err);
 void iff_loops_clear(iff_loops *loops);
 
-// Controller, gain, stability, root locus, modes: everything before the experiment. [init]
-pb_status iff_design(iff_result *result, pb_error *err);
+// Loops, controller, gain, stability, root locus, modes: everything before the experiment. bench:
+// its session may be missing where nothing is measured. Cleared by iff_result_clear, also after a
+// failure. [init]
+pb_status iff_prepare(const iff_options *options, const pb_bench *bench, iff_result *out,
+                      pb_error *err);
 
 // Both runs over the bus, then the estimates and the fits. [init]
 pb_status iff_measure(iff_result *result, pb_bench *bench, pb_error *err);
+
+// What was measured is told where it was. Report on stdout, files and plots as the options say.
+pb_status iff_present(const iff_result *result, pb_error *err);
 
 pb_status iff_print(const iff_result *result, pb_error *err);
 pb_status iff_print_json(const iff_result *result, pb_error *err);

@@ -5,6 +5,7 @@
 
 #include "control/fit.h"
 #include "iff_tool.h"
+#include "plant/plant.h"
 
 enum { FIT_CHANNELS = 8 };
 
@@ -75,9 +76,33 @@ static pb_status predict(const iff_result *r, iff_measurement *m, pb_error *err)
   return status;
 }
 
-static void compare(iff_measurement *m) {
+// The largest expected response of each output.
+static void largest_expected(const iff_measurement *m, double largest[PB_MAX_OUTPUTS]) {
+  for (size_t o = 0; o < m->frf.ny; o++) largest[o] = 0;
+  for (size_t k = 0; k < m->frf.nf * m->frf.ny * m->frf.nu; k++) {
+    size_t o = k / m->frf.nu % m->frf.ny;
+    largest[o] = fmax(largest[o], cabs(m->expected[k]));
+  }
+}
+
+// An output that no driven input moves, by symmetry say, beside others of its unit: its response is
+// rounding.
+static bool negligible(const pb_signal *output, const pb_experiment_channels *ch,
+                       const double *largest, size_t o) {
+  double most = 0;
+  for (size_t k = 0; k < ch->outputs; k++) {
+    if (strcmp(output[ch->output[k]].unit, output[ch->output[o]].unit) == 0)
+      most = fmax(most, largest[k]);
+  }
+  return largest[o] < 1e-6 * most;
+}
+
+void iff_compare(const pb_signal *output, const pb_experiment_channels *ch, iff_measurement *m) {
+  double largest[PB_MAX_OUTPUTS];
+  largest_expected(m, largest);
   m->agreement.coherence = 1;
   for (size_t o = 0; o < m->frf.ny; o++) {
+    if (negligible(output, ch, largest, o)) continue;
     pb_agreement one = pb_agreement_of(&m->frf, m->expected, o), *all = &m->agreement;
     if (one.magnitude_percent >= all->magnitude_percent) all->worst_hz = one.worst_hz;
     all->magnitude_percent = fmax(all->magnitude_percent, one.magnitude_percent);
@@ -97,7 +122,7 @@ static pb_status evaluate(const iff_result *r, pb_experiment *experiment, bool c
                                          m->frf.nf, &m->expected, err);
   }
   if (status != PB_OK) return status;
-  compare(m);
+  iff_compare(r->model->output, &r->channels, m);
   pb_fit_channel channel[FIT_CHANNELS];
   size_t channels = pb_fit_channels(&m->frf, channel, FIT_CHANNELS);
   pb_fit_options options = {.sample_rate = r->model->sample_rate,

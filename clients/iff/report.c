@@ -12,8 +12,12 @@ static double percent(double measured, double predicted) {
 
 static void print_head(const iff_result *r) {
   const pb_description *d = r->bench->description;
-  printf("%s, revision %u, %g Hz, %s\n", d->name, d->revision, r->model->sample_rate,
-         r->bench->realtime ? "real time" : "lockstep");
+  if (r->bench->session) {
+    printf("%s, revision %u, %g Hz, %s\n", d->name, d->revision, r->model->sample_rate,
+           r->bench->realtime ? "real time" : "lockstep");
+  } else {
+    printf("%s, %g Hz, predicted\n", d->name, r->model->sample_rate);
+  }
   printf("K = %g/(s + 2π·%g) · s/(s + 2π·%g)%s, delay %u samples, sign %+g\n", r->law.gain,
          r->law.integrator_hz, r->law.highpass_hz, r->searched ? " (best gain)" : "", r->loop.delay,
          r->loop.sign);
@@ -22,31 +26,34 @@ static void print_head(const iff_result *r) {
     printf(" %s → %s", r->model->output[r->loops.output[k]].name,
            r->model->input[r->loops.input[k]].name);
   }
+  printf("\n");
   uint64_t samples = r->open.report.samples + r->closed.report.samples;
   double seconds = r->open.report.seconds + r->closed.report.seconds;
-  printf("\n%llu samples in %.1f s (%.0f a second)\n", (unsigned long long)samples, seconds,
+  if (samples == 0) return;
+  printf("%llu samples in %.1f s (%.0f a second)\n", (unsigned long long)samples, seconds,
          (double)samples / seconds);
 }
 
 static pb_status print_modes(const iff_result *r, pb_error *err) {
-  bool open = r->open.frf.nf > 0;
+  bool open = r->open.frf.nf > 0, closed = r->closed.frf.nf > 0;
   pb_table t = {0};
   pb_table_number_column(&t, "open", "Hz", 6);
   pb_table_number_column(&t, "exact damping", "%", 4);
   if (open) pb_table_number_column(&t, "measured", "%", 4);
   pb_table_number_column(&t, "closed", "Hz", 6);
-  pb_table_number_column(&t, "measured", "Hz", 6);
+  if (closed) pb_table_number_column(&t, "measured", "Hz", 6);
   pb_table_number_column(&t, "predicted damping", "%", 4);
-  pb_table_number_column(&t, "measured", "%", 4);
-  pb_table_number_column(&t, "diff", "%", 2);
+  if (closed) pb_table_number_column(&t, "measured", "%", 4);
+  if (closed) pb_table_number_column(&t, "diff", "%", 2);
   for (size_t k = 0; k < r->modes; k++) {
     const iff_mode *m = &r->mode[k];
     pb_table_number(&t, m->open_exact.hz);
     pb_table_number(&t, 100 * m->open_exact.damping);
     if (open) pb_table_number(&t, 100 * m->open_measured.damping);
     pb_table_number(&t, m->closed_predicted.hz);
-    pb_table_number(&t, m->closed_measured.hz);
+    if (closed) pb_table_number(&t, m->closed_measured.hz);
     pb_table_number(&t, 100 * m->closed_predicted.damping);
+    if (!closed) continue;
     pb_table_number(&t, 100 * m->closed_measured.damping);
     pb_table_number(&t, percent(m->closed_measured.damping, m->closed_predicted.damping));
   }
@@ -69,6 +76,11 @@ pb_status iff_print(const iff_result *r, pb_error *err) {
   print_head(r);
   pb_status status = print_modes(r, err);
   printf("\n");
+  double smallest = INFINITY;
+  for (size_t k = 0; k < r->modes; k++)
+    smallest = fmin(smallest, r->mode[k].closed_predicted.damping);
+  printf("Smallest damping of these modes: %.4g %%%s\n", 100 * smallest,
+         r->searched ? ", the gain sought among those that can be doubled" : "");
   print_agreement("Undamped", &r->open);
   print_agreement("Damped", &r->closed);
   if (!r->stable) {
@@ -145,8 +157,10 @@ pb_status iff_print_json(const iff_result *r, pb_error *err) {
   pb_jsonout_begin(&j, stdout);
   pb_jsonout_object(&j, NULL);
   pb_jsonout_text(&j, "plant", r->bench->description->name);
-  pb_jsonout_integer(&j, "revision", r->bench->description->revision);
-  pb_jsonout_text(&j, "mode", r->bench->realtime ? "realtime" : "lockstep");
+  if (r->bench->session) {
+    pb_jsonout_integer(&j, "revision", r->bench->description->revision);
+    pb_jsonout_text(&j, "mode", r->bench->realtime ? "realtime" : "lockstep");
+  }
   pb_jsonout_number(&j, "sample_rate", r->model->sample_rate);
   json_controller(&j, r);
   json_attainable(&j, r);

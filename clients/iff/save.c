@@ -90,7 +90,7 @@ static pb_status save_mat(const iff_result *r, const char *dir, pb_error *err) {
   pb_matfile_scalar(mat, "delay", r->loop.delay);
   pb_frf_write_names(&closed, mat);
   if (r->open.frf.nf > 0) pb_frf_write_mat(&open, "undamped", mat);
-  pb_frf_write_mat(&closed, "damped", mat);
+  if (r->closed.frf.nf > 0) pb_frf_write_mat(&closed, "damped", mat);
   status = write_modes(r, mat, err);
   if (status == PB_OK) status = write_locus(r, mat, err);
   if (status == PB_OK) return pb_matfile_close(mat, err);
@@ -103,5 +103,14 @@ pb_status iff_save(const iff_result *r, const char *dir, pb_error *err) {
   if (status == PB_OK) status = save_response(r, &r->open, dir, "iff-undamped.csv", err);
   if (status == PB_OK) status = save_response(r, &r->closed, dir, "iff-damped.csv", err);
   if (status == PB_OK) status = save_locus(r, dir, err);
+  return status;
+}
+
+pb_status iff_present(const iff_result *r, pb_error *err) {
+  const iff_options *o = r->options;
+  pb_status status = o->json ? iff_print_json(r, err) : iff_print(r, err);
+  const char *dir = o->output_dir ? o->output_dir : ".";
+  if (status == PB_OK && o->output_dir) status = iff_save(r, dir, err);
+  if (status == PB_OK && o->plot) status = iff_plot(r, dir, err);
   return status;
 }

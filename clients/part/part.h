@@ -4,8 +4,7 @@
 
 #include "commands.h"
 
-pb_command_function part_build;
-pb_command_function part_reduce;
+pb_command_function part_build, part_reduce;
 pb_command_function part_doctor, part_import, part_truncate;
 
 #endif

@@ -6,11 +6,12 @@
 #include "assembly/stack.h"
 #include "assembly/system.h"
 
-// An orthonormal basis N of null(G) in factored form: Gᵀ P = Q R with pivoting, N = Q[:, rank:].
+// An orthonormal basis N of null(G) in factored form: Gᵀ P = Q R with pivoting, N = Q[:, rank:],
+// Q = I − V T Vᵀ (Schreiber and Van Loan, SIAM J. Sci. Stat. Comput. 10, 1989).
 typedef struct pb_null_basis {
   size_t n, rank;
-  double *q;  // n × constraints: the reflectors of dgeqp3
-  double *tau;
+  double *v;  // n × constraints, the first `rank` columns count: unit lower trapezoidal
+  double *t;  // rank × rank, upper triangular
 } pb_null_basis;
 
 // Rank-revealing factorisation of the constraints. Redundant ones are dropped; one that is nearly

@@ -7,6 +7,10 @@
 static const size_t largest_size = 20000;  // as of one element: 3.2 GB a matrix
 
 size_t pb_component_size(const pb_component *c) {
+  return pb_component_motions(c) + (c->boundary.kind == PB_BOUNDARY_RESISTOR ? 1 : 0);
+}
+
+size_t pb_component_motions(const pb_component *c) {
   switch (c->type) {
   case PB_RIGID_BODY:
     return 6;

@@ -5,6 +5,8 @@
 //   strut_1dof     v (point of the lower half at the centre, world), θ, d (upper half against
 //   lower, z) apa_2dof       v, θ, d, w (intermediate mass against lower half, z) super_element the
 //   element's own, in part axes
+// After these, where a resistor lies across the sensor stack: z, what has relaxed of the stack's
+// elongation (stack_boundary.c).
 // A connection that is an element has the element's coordinates, in joint axes.
 #ifndef PB_ASSEMBLY_MOTION_H
 #define PB_ASSEMBLY_MOTION_H
@@ -29,6 +31,9 @@ typedef struct pb_layout {
 
 // Number of coordinates of a component.
 size_t pb_component_size(const pb_component *component);
+
+// The same without z.
+size_t pb_component_motions(const pb_component *component);
 
 pb_status pb_layout_build(const pb_plant *plant, pb_layout *out, pb_error *err);
 void pb_layout_clear(pb_layout *layout);

@@ -174,6 +174,13 @@ static pb_status add_constraints(pb_stack_equations *s, const pb_motion *m, cons
   return PB_OK;
 }
 
+pb_status pb_stack_lock(pb_stack_equations *s, size_t coordinate, const char *owner,
+                        pb_error *err) {
+  const bool first[6] = {true};
+  const pb_motion m = {.count = 1, .column = {coordinate}, .value = {{1}}};
+  return add_constraints(s, &m, first, owner, err);
+}
+
 static const bool all_locked[6] = {true, true, true, true, true, true};
 
 // A joint sits at its two frames, which coincide in the nominal pose; an element fills the way
@@ -253,6 +260,7 @@ pb_status pb_stack_build(const pb_plant *plant, const pb_layout *layout, pb_warn
     st = stack_component(out, &plant->component[i], layout->component[i], err);
   for (size_t i = 0; i < plant->connection_count && !st; i++)
     st = stack_connection(out, plant, layout, i, err);
+  if (!st) st = pb_stack_boundaries(plant, layout, out, err);
   if (!st) st = pb_stack_signals(plant, layout, warnings, out, err);
   if (st) pb_stack_clear(out);
   return st;
@@ -267,5 +275,6 @@ void pb_stack_clear(pb_stack_equations *s) {
   free(s->d);
   free(s->g);
   free(s->owner);
+  free(s->relaxation);
   *s = (pb_stack_equations){0};
 }

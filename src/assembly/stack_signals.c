@@ -7,6 +7,7 @@
 #include <math.h>
 
 #include "assembly/stack.h"
+#include "plant/boundary.h"
 
 // column += gain × (direction · translation or rotation of the frame)
 static void add_direction(double *column, const pb_motion *m, int first, const double direction[3],
@@ -74,17 +75,27 @@ static void stack_input(const pb_plant *plant, const pb_layout *layout, const pb
   add_direction(column, &m, port->type == PB_TORQUE ? 3 : 0, port->direction, 1);
 }
 
+void pb_stack_sensor_elongation(const pb_plant *plant, const pb_layout *layout, int component,
+                                double gain, double *column) {
+  const pb_component *c = &plant->component[component];
+  size_t start = layout->component[component];
+  if (c->type == PB_SUPER_ELEMENT) {
+    add_elongation(column, plant, layout, component, c->super.sensor.frame, c->super.sensor.axis,
+                   gain);
+  } else {
+    column[start + 6] += gain;
+    column[start + 7] -= gain;
+  }
+}
+
+// The voltage over a resistor is that of the part of the elongation that has not relaxed.
 static void sense_voltage(const pb_plant *plant, const pb_layout *layout, const pb_port *port,
                           double *column) {
   const pb_component *c = &plant->component[port->component];
-  size_t start = layout->component[port->component];
-  if (c->type == PB_SUPER_ELEMENT) {
-    add_elongation(column, plant, layout, port->component, c->super.sensor.frame,
-                   c->super.sensor.axis, c->super.polarity * c->super.g_s);
-  } else {
-    column[start + 6] += c->strut.g_s;
-    column[start + 7] -= c->strut.g_s;
-  }
+  const double gain = c->type == PB_SUPER_ELEMENT ? c->super.polarity * c->super.g_s : c->strut.g_s;
+  pb_stack_sensor_elongation(plant, layout, port->component, gain, column);
+  if (c->boundary.kind == PB_BOUNDARY_RESISTOR)
+    column[layout->component[port->component] + pb_component_motions(c)] -= gain;
 }
 
 // strut_1dof: the sensor in series with k, c and f measures f_m = k d + c ḋ − f. apa_2dof: the
@@ -95,7 +106,9 @@ static void sense_force(const pb_plant *plant, const pb_layout *layout, const pb
   size_t start = layout->component[port->component];
   double *y0 = s->y[0] + output * s->n, *y1 = s->y[1] + output * s->n;
   if (c->type == PB_APA_2DOF) {
-    y0[start + 6] += c->strut.k_e, y0[start + 7] -= c->strut.k_e;
+    const double more = pb_boundary_stiffening(&c->boundary), k = c->strut.k_e + more;
+    y0[start + 6] += k, y0[start + 7] -= k;
+    if (c->boundary.kind == PB_BOUNDARY_RESISTOR) y0[start + pb_component_motions(c)] -= more;
     y1[start + 6] += c->strut.c_e, y1[start + 7] -= c->strut.c_e;
     return;
   }

@@ -45,6 +45,39 @@ static pb_status stack_keep(const pb_stack_equations *s, pb_system_stack *kept, 
   return PB_OK;
 }
 
+// Each relaxation becomes an input (its force dk δ z, which is −K's column of z) and an output
+// (δᵀq); what the outputs so far see of z itself is taken down.
+static pb_status relaxations_append(pb_stack_equations *s, pb_system *system, pb_error *err) {
+  const size_t r = s->relaxations, n = s->n, nu = s->nu, ny = s->ny;
+  if (r == 0) return PB_OK;
+  system->relaxation_time = malloc(r * sizeof(double));
+  system->relaxation_stiffness = malloc(r * sizeof(double));
+  system->relaxation_place = malloc(r * sizeof(size_t));
+  system->relaxation_output = calloc((ny + r) * r, sizeof(double));
+  bool ok = system->relaxation_time && system->relaxation_stiffness && system->relaxation_place &&
+            system->relaxation_output && widen(&s->f, n, nu, 0, r) && widen(&s->d, ny, nu, r, r);
+  for (int i = 0; i < 3 && ok; i++) ok = widen(&s->y[i], n, ny, 0, r);
+  if (!ok) return pb_fail_memory(err, "/components");
+  for (size_t j = 0; j < r; j++) {
+    const pb_relaxation *x = &s->relaxation[j];
+    const double *column = s->k + x->coordinate * n;
+    system->relaxation_time[j] = x->time;
+    system->relaxation_stiffness[j] = x->stiffness;
+    system->relaxation_place[j] = x->coordinate;
+    for (size_t o = 0; o < ny; o++)
+      system->relaxation_output[o + j * (ny + r)] = s->y[0][x->coordinate + o * n];
+    for (size_t i = 0; i < n; i++) {
+      if (i == x->coordinate) continue;
+      s->f[i + (nu + j) * n] = -column[i];
+      s->y[0][i + (ny + j) * n] = -column[i] / x->stiffness;
+    }
+  }
+  system->relaxations = r;
+  s->nu += r;
+  s->ny += r;
+  return PB_OK;
+}
+
 // With `kept` the equations are extended, and what they were is kept.
 static pb_status assemble(const pb_plant *plant, pb_warnings *warnings, pb_system **out,
                           pb_system_stack *kept, pb_error *err) {
@@ -63,6 +96,7 @@ static pb_status assemble(const pb_plant *plant, pb_warnings *warnings, pb_syste
     system->displacings = stack.n;
     st = extend(&stack, err);
   }
+  if (!st) st = relaxations_append(&stack, system, err);
   if (!st) st = pb_null_build(&stack, warnings, &basis, err);
   if (!st && basis.rank == basis.n)
     st = pb_fail(err, PB_ERR_SINGULAR, "/connections",
@@ -106,5 +140,9 @@ void pb_system_free(pb_system *system) {
   free(system->y1);
   free(system->y2);
   free(system->d);
+  free(system->relaxation_time);
+  free(system->relaxation_stiffness);
+  free(system->relaxation_place);
+  free(system->relaxation_output);
   free(system);
 }

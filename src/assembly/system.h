@@ -25,6 +25,13 @@ typedef struct pb_system {
   // The inputs from `displacing` on, `displacings` of them, are displacements in the metric of M
   // (f = M q sets η = Φᵀf at once) instead of forces; none in a plant as its file describes it.
   size_t displacing, displacings;
+  // The last `relaxations` inputs z and outputs e belong together: τ ż = e − z. None without
+  // resistors across sensor stacks (assembly/stack_boundary.c).
+  size_t relaxations;
+  double *relaxation_time;       // [relaxations] τ, s
+  double *relaxation_stiffness;  // [relaxations] dk, N/m: z moves nothing but by the force dk z
+  size_t *relaxation_place;      // [relaxations] stacked coordinate of z
+  double *relaxation_output;     // ny × relaxations: what outputs see of z itself
 } pb_system;
 
 // The stacked equations that a system was made from, kept beside it.

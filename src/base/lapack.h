@@ -9,6 +9,9 @@
 void dgemm_(const char *transa, const char *transb, const int *m, const int *n, const int *k,
             const double *alpha, const double *a, const int *lda, const double *b, const int *ldb,
             const double *beta, double *c, const int *ldc);
+void dsyr2k_(const char *uplo, const char *trans, const int *n, const int *k, const double *alpha,
+             const double *a, const int *lda, const double *b, const int *ldb, const double *beta,
+             double *c, const int *ldc);
 void dgemv_(const char *trans, const int *m, const int *n, const double *alpha, const double *a,
             const int *lda, const double *x, const int *incx, const double *beta, double *y,
             const int *incy);
@@ -22,6 +25,8 @@ void dgesv_(const int *n, const int *nrhs, double *a, const int *lda, int *ipiv,
 void dgetrf_(const int *m, const int *n, double *a, const int *lda, int *ipiv, int *info);
 void dgetrs_(const char *trans, const int *n, const int *nrhs, const double *a, const int *lda,
              const int *ipiv, double *b, const int *ldb, int *info);
+void dgetri_(const int *n, double *a, const int *lda, const int *ipiv, double *work,
+             const int *lwork, int *info);
 void zgesv_(const int *n, const int *nrhs, double complex *a, const int *lda, int *ipiv,
             double complex *b, const int *ldb, int *info);
 void dpotrf_(const char *uplo, const int *n, double *a, const int *lda, int *info);
@@ -38,6 +43,8 @@ void dgelsd_(const int *m, const int *n, const int *nrhs, double *a, const int *
              const int *lwork, int *iwork, int *info);
 void dgeqp3_(const int *m, const int *n, double *a, const int *lda, int *jpvt, double *tau,
              double *work, const int *lwork, int *info);
+void dlarft_(const char *direct, const char *storev, const int *n, const int *k, const double *v,
+             const int *ldv, const double *tau, double *t, const int *ldt);
 void dormqr_(const char *side, const char *trans, const int *m, const int *n, const int *k,
              const double *a, const int *lda, const double *tau, double *c, const int *ldc,
              double *work, const int *lwork, int *info);
@@ -57,6 +64,9 @@ void dsygvd_(const int *itype, const char *jobz, const char *uplo, const int *n,
 void dgeev_(const char *jobvl, const char *jobvr, const int *n, double *a, const int *lda,
             double *wr, double *wi, double *vl, const int *ldvl, double *vr, const int *ldvr,
             double *work, const int *lwork, int *info);
+void zgeev_(const char *jobvl, const char *jobvr, const int *n, double complex *a, const int *lda,
+            double complex *w, double complex *vl, const int *ldvl, double complex *vr,
+            const int *ldvr, double complex *work, const int *lwork, double *rwork, int *info);
 void dgees_(const char *jobvs, const char *sort, int (*select)(const double *, const double *),
             const int *n, double *a, const int *lda, int *sdim, double *wr, double *wi, double *vs,
             const int *ldvs, double *work, const int *lwork, int *bwork, int *info);

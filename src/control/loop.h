@@ -75,8 +75,8 @@ pb_status pb_loop_solver_polish(pb_loop_solver *solver, double gain, pb_pole *po
 // the dense eigenvalues. Above by the argument principle: det(I − L(z)) turns −2π·(poles outside)
 // along the circle when the open loop has none outside; the phase is followed in steps of less than
 // a radian, finest where poles are near. *worst (may be NULL) is the pole of largest |z| that is
-// known. Delays of the electronics count as states. The open loop must be stable (a floating plant
-// is PB_ERR_STATE above that size).
+// known. Delays of the electronics count as states. The open loop must be stable but for a
+// controller's integrators (a floating plant is PB_ERR_STATE above that size).
 enum { PB_LOOP_STABLE_DENSE = 400 };
 pb_status pb_loop_solver_stable(pb_loop_solver *solver, double gain, bool *stable, pb_pole *worst,
                                 pb_error *err);

@@ -66,7 +66,21 @@ static double complex determinant(double complex *a, size_t n) {
   return value;
 }
 
-// Phase of det(I − L(e^{iθ})) in −π … π.
+// A controller's integrator, on the circle itself: ((z − 1)/(z − 0.9)) takes its place in the
+// determinant, which then has neither pole nor zero there, and the same zeros outside.
+static bool is_integrator(const pb_loop_solver *s, size_t open) {
+  return open >= s->loop.model->nx && cabs(s->open[open] - 1) < 1e-9;
+}
+
+static double complex without_integrators(const pb_loop_solver *s, double complex z) {
+  double complex factor = 1;
+  for (size_t j = s->loop.model->nx; j < s->open_count; j++) {
+    if (is_integrator(s, j)) factor *= (z - 1) / (z - 0.9);
+  }
+  return factor;
+}
+
+// Phase of det(I − L(e^{iθ})), freed of integrators, in −π … π.
 static pb_status phase_at(pb_loop_solver *s, double gain, double theta, double *phase,
                           pb_error *err) {
   size_t n = s->loop.controller->ny, nk = s->loop.controller->nu;
@@ -83,7 +97,7 @@ static pb_status phase_at(pb_loop_solver *s, double gain, double theta, double *
       s->m[r + c * n] = (r == c) - factor * l;
     }
   }
-  *phase = carg(determinant(s->m, n));
+  *phase = carg(determinant(s->m, n) * without_integrators(s, z));
   return isfinite(*phase) ? PB_OK
                           : pb_fail(err, PB_ERR_NUMERIC, "loop", "no value at θ = %g", theta);
 }
@@ -102,6 +116,7 @@ static double *make_grid(const pb_loop_solver *s, size_t *count) {
   double *grid = malloc((even + 1 + s->open_count * AROUND) * sizeof *grid);
   size_t n = 0;
   for (size_t k = 0; grid && k <= even; k++) grid[n++] = M_PI * (double)k / (double)even;
+  if (grid) grid[0] = 1e-9;  // nothing turns below; at 0 itself an integrator has no value
   for (size_t j = 0; grid && j < s->open_count; j++) {
     double theta = carg(s->open[j]), width = fabs(1 - cabs(s->open[j]));
     if (theta < 0 || width > 0.1) continue;
@@ -136,7 +151,7 @@ static pb_status turn(pb_loop_solver *s, double gain, double a, double b, double
 
 static pb_status poles_outside(pb_loop_solver *s, double gain, long *outside, pb_error *err) {
   for (size_t j = 0; j < s->open_count; j++) {
-    if (cabs(s->open[j]) < 1) continue;
+    if (cabs(s->open[j]) < 1 || is_integrator(s, j)) continue;
     return pb_fail(err, PB_ERR_STATE, "loop",
                    "the open loop has a pole on or outside the unit circle");
   }

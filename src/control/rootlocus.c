@@ -177,9 +177,8 @@ void pb_best_gain_clear(pb_best_gain *best) {
   *best = (pb_best_gain){0};
 }
 
-// Row sum of |L| averaged (geometric mean) over the band: the gain at which the loop gain is
-// about 1.
-static pb_status unit_gain(const pb_loop *loop, double f1, double f2, double *gain, pb_error *err) {
+pb_status pb_loop_unit_gain(const pb_loop *loop, double f1, double f2, double *gain,
+                            pb_error *err) {
   enum { POINTS = 25 };
   size_t n = loop->controller->ny;
   double hz[POINTS];
@@ -215,25 +214,40 @@ static size_t best_of(const pb_rootlocus *l, const bool *unstable) {
   return best;
 }
 
+static pb_status can_be_doubled(pb_loop_solver *s, double gain, bool *yes, pb_error *err) {
+  return pb_loop_solver_stable(s, 2 * gain, yes, NULL, err);
+}
+
 // Leaves out gains that cannot be doubled, as all poles of the whole plant say. Instability is
-// taken to stay once it is there, so that the last good gain below the best one is found by
-// bisection.
+// taken to stay once it is there, so that the last good gain up to the best one is found by
+// bisection; *limit is then where between it and the next one doubling ends, to 0.5 %.
 static pb_status keep_margin(pb_loop_solver *s, const pb_rootlocus *l, bool *unstable,
-                             pb_error *err) {
+                             double *limit, pb_error *err) {
   size_t bad = best_of(l, unstable), good = 0;
-  bool stable;
+  bool yes;
+  *limit = INFINITY;
   if (bad == l->gains) return PB_OK;
-  pb_status status = pb_loop_solver_stable(s, 2 * l->gain[bad], &stable, NULL, err);
-  if (status != PB_OK || stable) return status;
+  pb_status status = can_be_doubled(s, l->gain[bad], &yes, err);
+  if (status != PB_OK) return status;
+  if (yes) good = bad++;
   while (bad - good > 1 && status == PB_OK) {
     size_t middle = (good + bad) / 2;
-    status = pb_loop_solver_stable(s, 2 * l->gain[middle], &stable, NULL, err);
-    if (stable)
+    status = can_be_doubled(s, l->gain[middle], &yes, err);
+    if (yes)
       good = middle;
     else
       bad = middle;
   }
-  for (size_t k = bad; k < l->gains; k++) unstable[k] = true;
+  for (size_t k = good + 1; k < l->gains; k++) unstable[k] = true;
+  double low = l->gain[good], high = bad < l->gains ? l->gain[bad] : low;
+  if (status == PB_OK) status = can_be_doubled(s, high, &yes, err);
+  if (yes) low = high;
+  while (status == PB_OK && high > 1.005 * low && low > 0) {
+    double middle = sqrt(low * high);
+    status = can_be_doubled(s, middle, &yes, err);
+    *(yes ? &low : &high) = middle;
+  }
+  *limit = low;
   return status;
 }
 
@@ -258,12 +272,10 @@ static void forget_unreachable(pb_rootlocus *l) {
 }
 
 // Repeats the search between the neighbours of the best gain, starting from the lower one's poles.
-// unstable (may be NULL): gains of `from` that must not be reached.
-static pb_status refine(pb_loop_solver *s, double f2, const pb_rootlocus *from,
-                        const bool *unstable, size_t best, unsigned rounds, pb_best_gain *out,
-                        pb_error *err) {
-  size_t low = best - 1, high = best + 1;
-  if (high == from->gains || (unstable && unstable[high])) high = best;
+// Not beyond `limit`.
+static pb_status refine(pb_loop_solver *s, double f2, const pb_rootlocus *from, double limit,
+                        size_t best, unsigned rounds, pb_best_gain *out, pb_error *err) {
+  size_t low = best - 1, high = best + 1 < from->gains ? best + 1 : best;
   out->gain = from->gain[best];
   out->smallest_damping = from->smallest[best];
   if (rounds == 0) return PB_OK;
@@ -273,14 +285,14 @@ static pb_status refine(pb_loop_solver *s, double f2, const pb_rootlocus *from,
   if (status != PB_OK) return status;
   memcpy(l.is_mode, from->is_mode, l.branches * sizeof *l.is_mode);
   for (size_t b = 0; b < l.branches; b++) l.pole[b * l.gains] = from->pole[b * from->gains + low];
-  double g1 = from->gain[low], g2 = from->gain[high];
+  double g1 = from->gain[low], g2 = fmin(from->gain[high], limit);
   for (size_t k = 0; k < l.gains; k++) {
     l.gain[k] = g1 + (g2 - g1) * (double)k / (double)(l.gains - 1);
   }
   status = follow(s, f2, &l, err);
   size_t finer = status == PB_OK ? best_of(&l, allowed) : l.gains;
   if (finer < l.gains && l.smallest[finer] >= from->smallest[best]) {
-    status = refine(s, f2, &l, NULL, finer, rounds - 1, out, err);
+    status = refine(s, f2, &l, limit, finer, rounds - 1, out, err);
   }
   pb_rootlocus_clear(&l);
   return status;
@@ -316,10 +328,10 @@ pb_status pb_best_gain_find(pb_loop_solver *s, double f1, double f2, double deca
                    decades);
   }
   if (decades == 0) decades = 2;
-  double unit = 1;
+  double unit = 1, limit = INFINITY;
   pb_rootlocus l = {0};
   bool unstable[SEARCH_GAINS] = {false};
-  pb_status status = unit_gain(pb_loop_solver_loop(s), f1, f2, &unit, err);
+  pb_status status = pb_loop_unit_gain(pb_loop_solver_loop(s), f1, f2, &unit, err);
   if (status == PB_OK) status = start(s, SEARCH_GAINS, f1, f2, &l, err);
   if (status != PB_OK) goto done;
   l.gain[0] = 0;
@@ -330,7 +342,7 @@ pb_status pb_best_gain_find(pb_loop_solver *s, double f1, double f2, double deca
   status = follow(s, f2, &l, err);
   if (status == PB_OK) {
     forget_unreachable(&l);
-    status = keep_margin(s, &l, unstable, err);
+    status = keep_margin(s, &l, unstable, &limit, err);
   }
   if (status == PB_OK) status = attainable(&l, unstable, out, err);
   if (status != PB_OK) goto done;
@@ -340,7 +352,7 @@ pb_status pb_best_gain_find(pb_loop_solver *s, double f1, double f2, double deca
                      "%zu modes in %g … %g Hz, none damped by a stable gain", out->modes, f1, f2);
     goto done;
   }
-  status = refine(s, f2, &l, unstable, best, REFINE_ROUNDS, out, err);
+  status = refine(s, f2, &l, limit, best, REFINE_ROUNDS, out, err);
 done:
   pb_rootlocus_clear(&l);
   if (status != PB_OK) pb_best_gain_clear(out);

@@ -22,6 +22,10 @@ pb_status pb_rootlocus_compute(pb_loop_solver *solver, const double *gain, size_
 
 void pb_rootlocus_clear(pb_rootlocus *locus);
 
+// The gain at which the loop gain is about 1 in a band: the largest row sum of |L|, averaged
+// geometrically. A search for gains begins around it. [init] PB_ERR_STATE: the loop has no gain.
+pb_status pb_loop_unit_gain(const pb_loop *loop, double f1, double f2, double *gain, pb_error *err);
+
 // The gain that gives the modes of the band their largest smallest damping.
 typedef struct pb_best_gain {
   double gain;

@@ -204,6 +204,14 @@ static pb_status copy_signals(const pb_model *from, pb_model *to, pb_error *err)
   return pb_electronics_attach(to, from->input_electronics, from->output_electronics, err);
 }
 
+pb_status pb_model_copy_header(const pb_model *from, pb_model *to, pb_error *err) {
+  to->sample_rate = from->sample_rate;
+  to->dof = from->dof;
+  memcpy(to->mode_hz, from->mode_hz, from->modes * sizeof(double));
+  memcpy(to->mode_damping, from->mode_damping, from->modes * sizeof(double));
+  return copy_signals(from, to, err);
+}
+
 // Numbers that are each fine may still overflow in products.
 static pb_status check_finite(const pb_model *m, pb_error *err) {
   size_t values = m->block_value[m->blocks];

@@ -28,6 +28,10 @@ pb_status pb_model_builder_add(pb_model_builder *builder, const pb_model_part *p
 pb_status pb_model_builder_close(pb_model_builder *builder, double max_frequency, pb_model **out,
                                  pb_error *err);
 
+// Name, signals, rates, modes and electronics of one model for another that has the first of its
+// inputs and outputs. d is the caller's.
+pb_status pb_model_copy_header(const pb_model *from, pb_model *to, pb_error *err);
+
 // Frees what an unfinished builder holds.
 void pb_model_builder_discard(pb_model_builder *builder);
 

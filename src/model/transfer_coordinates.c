@@ -305,6 +305,25 @@ static int find_component(const pb_plant *plant, const char *name) {
   return -1;
 }
 
+// What has relaxed in a stack with a resistor goes on where it was; where the resistor takes the
+// place of an open end nothing has, else everything: δᵀq, by the row of z in K (stack_boundary.c).
+static void relaxation_carry(const carrier *c, size_t now, size_t old, bool same) {
+  const pb_component *s = &c->now->plant->component[now], *was = &c->old->plant->component[old];
+  const size_t z = c->now->layout.component[now] + pb_component_motions(s), n = c->old->n;
+  if (s->boundary.kind != PB_BOUNDARY_RESISTOR || was->boundary.kind == PB_BOUNDARY_OPEN) return;
+  if (was->boundary.kind == PB_BOUNDARY_RESISTOR && same) {
+    keep(c, z, c->old->layout.component[old] + pb_component_motions(was), 1);
+    return;
+  }
+  const double *k = c->now->k + z * c->now->n;
+  for (size_t i = 0; i < c->now->n; i++) {
+    if (i == z || k[i] == 0) continue;
+    add_row(c, z, -k[i] / k[z], c->l + i * n);
+    for (size_t j = 0; j < c->now->nu; j++)
+      c->lu[z * c->now->nu + j] -= k[i] / k[z] * c->lu[i * c->now->nu + j];
+  }
+}
+
 static pb_status component_carry(const carrier *c, size_t now) {
   const pb_component *s = &c->now->plant->component[now];
   const int old = find_component(c->old->plant, s->name);
@@ -312,14 +331,17 @@ static pb_status component_carry(const carrier *c, size_t now) {
   c->known[now] = true;
   const pb_component *was = &c->old->plant->component[old];
   const size_t to = c->now->layout.component[now], from = c->old->layout.component[old];
-  if (s->type != was->type ||
-      (s->type == PB_SUPER_ELEMENT && !same_element(&s->super, &was->super)))
-    return changed_component(c, now, (size_t)old);
-  if (s->type == PB_RIGID_BODY)
+  pb_status st = PB_OK;
+  const bool same =
+      s->type == was->type && (s->type != PB_SUPER_ELEMENT || same_element(&s->super, &was->super));
+  if (!same)
+    st = changed_component(c, now, (size_t)old);
+  else if (s->type == PB_RIGID_BODY)
     keep_body(c, s, to, was, from);
   else
-    keep(c, to, from, pb_component_size(s));
-  return PB_OK;
+    keep(c, to, from, pb_component_motions(s));
+  if (!st) relaxation_carry(c, now, (size_t)old, same);
+  return st;
 }
 
 // Components that are new move with what holds them, found from the known ones outwards; what hangs

@@ -6,6 +6,7 @@
 
 #include "base/lapack.h"
 #include "base/text.h"
+#include "plant/boundary.h"
 #include "plant/loader.h"
 
 static const pb_field apa_fields[] = {
@@ -44,8 +45,10 @@ static const pb_field super_fields[] = {
 
 #define PB_PLACE_KEYS "type", "model", "position", "quaternion", "z_axis", "x_axis"
 static const char *const strut_keys[] = {PB_PLACE_KEYS, NULL};
+static const char *const apa_keys[] = {PB_PLACE_KEYS, "boundary", NULL};
 static const char *const body_keys[] = {PB_PLACE_KEYS, "inertia", "center_of_mass", "frames", NULL};
-#define PB_SUPER_KEYS PB_PLACE_KEYS, "file", "modal_damping", "rayleigh", "frames", "stacks", "ends"
+#define PB_SUPER_KEYS \
+  PB_PLACE_KEYS, "file", "modal_damping", "rayleigh", "frames", "stacks", "ends", "boundary"
 static const char *const super_keys[] = {PB_SUPER_KEYS, NULL};
 // A model may serve components and joints: only the latter know "nodes".
 static const char *const super_model_keys[] = {PB_SUPER_KEYS, "nodes", NULL};
@@ -62,7 +65,7 @@ typedef struct type_entry {
 static const type_entry types[] = {
     {"rigid_body", PB_RIGID_BODY, body_keys, body_fields, PB_COUNT(body_fields)},
     {"super_element", PB_SUPER_ELEMENT, super_keys, super_fields, PB_COUNT(super_fields)},
-    {"apa_2dof", PB_APA_2DOF, strut_keys, apa_fields, PB_COUNT(apa_fields)},
+    {"apa_2dof", PB_APA_2DOF, apa_keys, apa_fields, PB_COUNT(apa_fields)},
     {"strut_1dof", PB_STRUT_1DOF, strut_keys, strut_fields, PB_COUNT(strut_fields)},
 };
 
@@ -179,7 +182,8 @@ static pb_status read_body(const pb_reader *r, pb_component *c) {
 static pb_status read_strut(const pb_reader *r, pb_component *c) {
   const double bottom[3] = {0, 0, -0.5 * c->strut.length}, top[3] = {0, 0, 0.5 * c->strut.length};
   pb_status st = add_frame(c, "bottom", bottom, 0, 0, r->err);
-  return st ? st : add_frame(c, "top", top, 0, 1, r->err);
+  if (!st) st = add_frame(c, "top", top, 0, 1, r->err);
+  return st || c->type != PB_APA_2DOF ? st : pb_loader_boundary(r, c);
 }
 
 // One of "stacks": {"frames": [A, B], "axis": [..]}.
@@ -253,6 +257,7 @@ static pb_status read_super(pb_loader *loader, const pb_reader *r, pb_component 
   if (!st) st = read_frames(r, c);
   if (!st) st = read_stacks(r, c);
   if (!st) st = read_ends(r, &c->super);
+  if (!st) st = pb_loader_boundary(r, c);
   // Its ends are also its bottom and top, as those of the lumped actuators, unless the file says
   // else.
   if (!st && c->super.has_ends && pb_component_frame(c, "bottom") < 0)

@@ -69,6 +69,22 @@ typedef struct pb_super_element {
   bool has_ends;
 } pb_super_element;
 
+// What the electrodes of a sensor stack are connected to. [report 2.5]
+typedef enum pb_boundary_kind {
+  PB_BOUNDARY_SHORT,     // one another, or a charge amplifier: the stack has its short-circuit
+                         // stiffness
+  PB_BOUNDARY_OPEN,      // nothing, or a voltage amplifier
+  PB_BOUNDARY_RESISTOR,  // one another through a resistor
+} pb_boundary_kind;
+
+typedef struct pb_boundary {
+  pb_boundary_kind kind;
+  double coupling;     // k_33, 0 … 1
+  double capacitance;  // F, of the free stack
+  double resistance;   // Ohm
+  double stiffness;    // N/m, of the short-circuited stack
+} pb_boundary;
+
 typedef struct pb_component {
   char *name;
   char *pointer;  // JSON pointer, for messages
@@ -76,6 +92,7 @@ typedef struct pb_component {
   pb_pose pose;
   size_t frame_count;
   pb_frame *frame;
+  pb_boundary boundary;  // apa_2dof, super_element
   union {
     pb_rigid_body body;
     pb_strut strut;

@@ -46,13 +46,13 @@ tool_process tool_start(const char *name, uint32_t domain, const char *environme
   snprintf(copy, sizeof copy, "%s", line);
   snprintf(file, sizeof file, "%s/%s", PB_BIN, name);
   snprintf(number, sizeof number, "%u", domain);
-  size_t fixed = 1;
   argv[0] = file;
+  size_t count = 1 + words(copy, argv + 1, WORDS);  // a command comes before the options
   if (domain != TOOL_NO_DOMAIN) {
-    argv[fixed++] = "--domain";
-    argv[fixed++] = number;
+    argv[count++] = "--domain";
+    argv[count++] = number;
   }
-  argv[fixed + words(copy, argv + fixed, WORDS)] = NULL;
+  argv[count] = NULL;
   tool_process t = {.out = memfd_create("out", MFD_CLOEXEC),
                     .err = memfd_create("err", MFD_CLOEXEC)};
   assert_true(t.out >= 0 && t.err >= 0);

@@ -6,9 +6,13 @@
 #include "assembly/system.h"
 #include "base/json.h"
 #include "base/text.h"
+#include "control/hac.h"
+#include "control/jacobian.h"
 #include "control/loop.h"
+#include "control/margins.h"
 #include "model/model.h"
 #include "model/transfer.h"
+#include "signal/psd.h"
 
 void *__real_malloc(size_t size);
 void *__real_calloc(size_t count, size_t size);
@@ -101,6 +105,11 @@ static void test_bench_electronics(void **state) {
             "apa300ml-bench-electronics");
 }
 
+static void test_bench_resistor(void **state) {
+  (void)state;
+  fail_each(load, PB_TEST_DATA "/resistor-bench.json", "resistor-bench");
+}
+
 static void test_hexapod(void **state) {
   (void)state;
   fail_each(load, PB_CONFIG "/plants/nano-hexapod.json", "nano-hexapod");
@@ -165,6 +174,50 @@ static pb_status loop_solver(const char *path, pb_error *err) {
   return st;
 }
 
+// HAC around one strut: shape, plant, gain, controllers, margins.
+static pb_status hac(const pb_model *model, pb_lti *shape, pb_lti *controller, pb_lti *both,
+                     pb_mimo *mimo, double **grid, pb_error *err) {
+  const size_t input = 0, output = 1;
+  const pb_hac_channels channels = {1, &input, NULL, &output};
+  const pb_hac_frame frame = {0};
+  const pb_hac_shape wanted = pb_hac_shape_default(100);
+  pb_pole pole = {0, 90, 0.01};
+  const pb_pole_list poles = {.count = 1, .item = &pole};
+  double complex plant[64], l[64];
+  double gain;
+  size_t count;
+  pb_status st = pb_hac_shape_discrete(&wanted, model->sample_rate, shape, err);
+  if (!st) st = pb_margins_grid(10, 1000, 40, &poles, grid, &count, err);
+  if (!st) st = pb_hac_plant(model, &channels, &frame, NULL, 0, *grid, count, plant, err);
+  if (!st) st = pb_hac_gains(shape, *grid, count, plant, plant, 1, false, &gain, err);
+  if (!st) st = pb_hac_controller(shape, &gain, &frame, 1, controller, err);
+  if (!st) st = pb_hac_combine(controller, 1, controller, 0, 1, both, err);
+  if (!st) st = pb_hac_loop_gain(shape, &gain, 0, *grid, count, 1, plant, l, err);
+  return st ? st : pb_mimo_analyse(*grid, count, 1, l, mimo, err);
+}
+
+static pb_status hac_design(const char *path, pb_error *err) {
+  const size_t force = 1, output = 1;
+  pb_model *model = NULL;
+  pb_lti shape = {0}, controller = {0}, both = {0};
+  pb_mimo mimo = {0};
+  pb_psd *psd = NULL;
+  double *grid = NULL, j, inverse, condition;
+  pb_status st = pb_model_load(path, NULL, &model, err);
+  if (!st) st = hac(model, &shape, &controller, &both, &mimo, &grid, err);
+  if (!st) st = pb_jacobian_static(model, &output, &output, &force, 1, &j, err);
+  if (!st) st = pb_jacobian_invert(&j, 1, &inverse, &condition, err);
+  if (!st) st = pb_psd_new(1000, 64, PB_WINDOW_HANN, &psd, err);
+  pb_psd_free(psd);
+  pb_mimo_clear(&mimo);
+  pb_lti_free(&shape);
+  pb_lti_free(&controller);
+  pb_lti_free(&both);
+  free(grid);
+  pb_model_free(model);
+  return st;
+}
+
 // A plant and a changed one with their maps, and the way from one to the other.
 static pb_status transfer(const char *path, pb_error *err) {
   pb_model *from = NULL, *to = NULL;
@@ -199,6 +252,11 @@ static void test_loop(void **state) {
             "loop with electronics");
 }
 
+static void test_hac(void **state) {
+  (void)state;
+  fail_each(hac_design, PB_CONFIG "/plants/apa300ml-bench.json", "HAC");
+}
+
 static void test_pack_and_truncate(void **state) {
   (void)state;
   fail_each(pack_and_truncate, PB_CONFIG "/plants/apa300ml-bench.json", "pack and truncate");
@@ -212,11 +270,13 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_bench),
       cmocka_unit_test(test_bench_electronics),
+      cmocka_unit_test(test_bench_resistor),
       cmocka_unit_test(test_hexapod),
       cmocka_unit_test(test_elements),
       cmocka_unit_test(test_transfer),
       cmocka_unit_test(test_loop),
       cmocka_unit_test(test_pack_and_truncate),
+      cmocka_unit_test(test_hac),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
