@@ -1,44 +1,24 @@
-// Lists of nodes and of rows from outside programs: see matrix_file.h.
+// Lists of nodes from outside programs: see matrix_file.h.
 //
 // Ansys writes pages: a banner of some lines, then a header, then rows until a blank line.
 //   NODE  X  Y  Z  [THXY  THYZ  THZX]       NLIST, with or without angles
-//   NODE  DOF | LABEL                        MLIST
-// A file may hold both lists, in any order.
+// A file may hold the list of masters, too, in front of it or behind.
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
+#include "part/listing.h"
 #include "part/matrix_build.h"
 
 // ---- what a line is -----------------------------------------------------------------------------
 
-// Splits off the words of a line; returns how many there are, at most `most`.
-static int split_words(const char *text, char word[][12], int most) {
-  int count = 0;
-  while (count < most) {
-    text += strspn(text, " \t");
-    size_t length = strcspn(text, " \t");
-    if (!length) break;
-    snprintf(word[count++], 12, "%.*s", (int)(length < 11 ? length : 11), text);
-    text += length;
-  }
-  return count;
-}
-
 // Numbers that a row of the list holds behind the node: 3 or 6; 0: this is no such header.
 static int nlist_header(const char *text) {
   char word[8][12];
-  int words = split_words(text, word, 8);
+  int words = pb_listing_words(text, word, 8);
   bool is = words >= 4 && !strcmp(word[0], "NODE") && !strcmp(word[1], "X") &&
             !strcmp(word[2], "Y") && !strcmp(word[3], "Z");
   return is && (words == 4 || words == 7) ? words - 1 : 0;
-}
-
-static bool mlist_header(const char *text) {
-  char word[4][12];
-  int words = split_words(text, word, 4);
-  return words >= 2 && !strcmp(word[0], "NODE") &&
-         (!strcmp(word[1], "DOF") || !strcmp(word[1], "LABEL"));
 }
 
 static bool is_node_keyword(const char *text) {
@@ -48,18 +28,17 @@ static bool is_node_keyword(const char *text) {
   return !*text || *text == ',';
 }
 
-typedef enum list_kind { LIST_TABLE, LIST_NLIST, LIST_MLIST, LIST_KEYWORD, LIST_MARKET } list_kind;
+typedef enum list_kind { LIST_TABLE, LIST_NLIST, LIST_KEYWORD, LIST_MARKET } list_kind;
 
 // Judges the whole file, since a list may begin behind others; LIST_TABLE: plain numbers.
-static pb_status judge_list(const char *path, bool masters, list_kind *out, pb_error *err) {
+static pb_status judge_list(const char *path, list_kind *out, pb_error *err) {
   pb_lines in;
   *out = LIST_TABLE;
   pb_status st = pb_lines_open(&in, path, err);
   while (!st && *out == LIST_TABLE && pb_lines_next(&in)) {
     if (in.number == 1 && !strncasecmp(in.text, "%%MatrixMarket", 14)) *out = LIST_MARKET;
-    if (masters && mlist_header(in.text)) *out = LIST_MLIST;
-    if (!masters && nlist_header(in.text)) *out = LIST_NLIST;
-    if (!masters && is_node_keyword(in.text)) *out = LIST_KEYWORD;
+    if (nlist_header(in.text)) *out = LIST_NLIST;
+    if (is_node_keyword(in.text)) *out = LIST_KEYWORD;
   }
   if (!st) st = in.status;
   pb_lines_close(&in);
@@ -106,8 +85,15 @@ static pb_status read_node(pb_lines *in, int numbers, const char *separators, no
   return add_node(list, number, value, in->err);
 }
 
-static bool next_is_row(pb_lines *in) {
-  return !pb_scan_done(in->text) && strncmp(in->text, " ***", 4);
+// A node number and coordinates alone on a line, as no line of a banner is.
+static bool looks_like_node(const char *text) {
+  char *at = (char *)text;
+  int64_t number;
+  double value;
+  int values = 0;
+  if (!pb_scan_integer(&at, &number)) return false;
+  while (pb_scan_real(&at, &value)) values++;
+  return values >= 3 && pb_scan_done(at);
 }
 
 static pb_status read_nlist(pb_lines *in, node_list *list) {
@@ -116,11 +102,13 @@ static pb_status read_nlist(pb_lines *in, node_list *list) {
     int header = nlist_header(in->text);
     if (header) {
       numbers = header;
-    } else if (numbers && next_is_row(in)) {
+    } else if (numbers && pb_listing_row(in)) {
       pb_status st = read_node(in, numbers, "", list);
       if (st) return st;
     } else {
       numbers = 0;
+      if (looks_like_node(in->text))
+        return pb_lines_fail(in, "a row of nodes without a header NODE X Y Z above it");
     }
   }
   return in->status;
@@ -139,14 +127,9 @@ static pb_status read_keyword_nodes(pb_lines *in, node_list *list) {
   return in->status;
 }
 
-// A first line without any number may be a header.
-static bool is_title(const pb_lines *in) {
-  return in->number == 1 && !strpbrk(in->text, "0123456789");
-}
-
 static pb_status read_node_table(pb_lines *in, node_list *list) {
   while (pb_lines_next_filled(in)) {
-    if (is_title(in)) continue;
+    if (pb_listing_title(in)) continue;
     bool separated = strpbrk(in->text, ",;");
     pb_status st = read_node(in, 3, separated ? ",;" : "", list);
     if (st) return st;
@@ -217,7 +200,7 @@ pb_status pb_node_file_read(const char *path, pb_node_file *out, pb_error *err) 
   pb_matrix_format format;
   list_kind kind = LIST_MARKET;
   pb_status st = pb_matrix_file_detect(path, &format, err);
-  if (!st && format != PB_FORMAT_MAT5) st = judge_list(path, false, &kind, err);
+  if (!st && format != PB_FORMAT_MAT5) st = judge_list(path, &kind, err);
   if (!st)
     st = kind == LIST_MARKET ? read_array_nodes(path, &list, err)
                              : read_text_nodes(path, kind, &list, err);
@@ -230,102 +213,4 @@ void pb_node_file_clear(pb_node_file *file) {
   free(file->number);
   free(file->xyz);
   *file = (pb_node_file){0};
-}
-
-// ---- rows ---------------------------------------------------------------------------------------
-
-// UX UY UZ ROTX ROTY ROTZ, or 0 … 6; −1: neither.
-static int read_direction(char **at) {
-  static const char *const name[] = {"UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ"};
-  int64_t number;
-  if (pb_scan_integer(at, &number)) return number >= 0 && number <= 6 ? (int)number : -1;
-  char *p = *at + strspn(*at, " \t");
-  size_t length = strcspn(p, " \t,;");
-  for (int k = 0; k < 6; k++) {
-    if (length != strlen(name[k]) || strncasecmp(p, name[k], length)) continue;
-    *at = p + length;
-    return k + 1;
-  }
-  return -1;
-}
-
-static pb_status add_row(pb_matrix_build *b, pb_lines *in, int64_t node, int direction) {
-  int64_t row;
-  size_t before = b->file->rows;
-  pb_status st = pb_matrix_build_label(b, (pb_row_label){node, direction}, &row, in->err);
-  if (!st && b->file->rows == before)
-    st = pb_lines_fail(in, "direction %d of node %jd is listed twice", direction, (intmax_t)node);
-  return st;
-}
-
-// "76423 UX", in newer releases with a third column that says whether the master is a support.
-static pb_status read_mlist(pb_lines *in, pb_matrix_build *b) {
-  bool inside = false;
-  while (pb_lines_next(in)) {
-    if (mlist_header(in->text)) {
-      inside = true;
-    } else if (inside && next_is_row(in)) {
-      int64_t node;
-      char *at = in->text;
-      int direction = pb_scan_integer(&at, &node) && node > 0 ? read_direction(&at) : -1;
-      if (direction < 1) return pb_lines_fail(in, "expected a node and one of UX … ROTZ");
-      char *rest = at + strspn(at, " \t");
-      if (*rest && strncmp(rest, "OFF", 3) && strncmp(rest, "ON", 2))
-        return pb_lines_fail(in, "unexpected text behind the direction");
-      pb_status st = add_row(b, in, node, direction);
-      if (st) return st;
-    } else {
-      inside = false;
-    }
-  }
-  return in->status;
-}
-
-// CalculiX: "node.direction"; otherwise node and direction apart.
-static pb_status read_dof_table(pb_lines *in, pb_matrix_build *b) {
-  while (pb_lines_next_filled(in)) {
-    if (is_title(in)) continue;
-    int64_t node;
-    char *at = in->text, *point = strchr(at, '.');
-    if (point) *point = ' ';
-    bool ok = pb_scan_integer(&at, &node) && node > 0 && pb_scan_separator(&at, ",;");
-    int direction = ok ? read_direction(&at) : -1;
-    if (direction < 0 || !pb_scan_done(at))
-      return pb_lines_fail(in, "expected a node and a direction (1 … 6)");
-    pb_status st = add_row(b, in, node, direction);
-    if (st) return st;
-  }
-  return in->status;
-}
-
-pb_status pb_dof_file_has_masters(const char *path, bool *out, pb_error *err) {
-  list_kind kind;
-  pb_status st = judge_list(path, true, &kind, err);
-  *out = !st && kind == LIST_MLIST;
-  return st;
-}
-
-pb_status pb_dof_file_read(const char *path, pb_dof_file *out, pb_error *err) {
-  *out = (pb_dof_file){0};
-  pb_matrix_file rows = {0};
-  pb_matrix_build build = {.file = &rows};
-  list_kind kind = LIST_TABLE;
-  pb_lines in = {0};
-  pb_status st = judge_list(path, true, &kind, err);
-  if (!st) st = pb_lines_open(&in, path, err);
-  if (!st) st = kind == LIST_MLIST ? read_mlist(&in, &build) : read_dof_table(&in, &build);
-  if (!st && !rows.rows) st = pb_fail(err, PB_ERR_SYNTAX, path, "lists no rows");
-  if (!st) {
-    *out = (pb_dof_file){.count = rows.rows, .label = rows.label};
-    rows.label = NULL;
-  }
-  pb_lines_close(&in);
-  pb_matrix_build_end(&build);
-  pb_matrix_file_clear(&rows);
-  return st;
-}
-
-void pb_dof_file_clear(pb_dof_file *file) {
-  free(file->label);
-  *file = (pb_dof_file){0};
 }

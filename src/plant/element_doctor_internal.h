@@ -34,7 +34,7 @@ double pb_signed_hz(double omega2);
 pb_status pb_measure_modes(const char *name, size_t n, const double *k, const double *m, double *hz,
                            double *shape, pb_error *err);
 
-// ---- frames (element_place.c) ----
+// ---- places of the frames (element_place.c) ----
 
 // Where the null space of K says that the frames are and how they are turned, relative to frame 0.
 typedef struct pb_placement {
@@ -47,6 +47,8 @@ typedef struct pb_placement {
 pb_status pb_placement_solve(const char *name, const pb_element_data *e, pb_placement *out,
                              pb_error *err);
 void pb_placement_clear(pb_placement *placement);
+
+// ---- their comparison with the file (element_frames.c) ----
 
 // Compares it with the coordinates of the file, notes what it finds and cures the working copy.
 // tolerance: relative accuracy that the digits allow. Fails with PB_ERR_MEMORY.

@@ -359,6 +359,8 @@ static void test_broken_nodes(void **state) {
       {"   NODE   X   Y   Z\n  1  0.0  0.0  0.0\n  2  0.0  0.0  0.0", ":3", "truncated"},
       {"   NODE   X   Y   Z\n  1  0.0  0.0  0.0\n  1  0.0  0.0  0.0\n", "", "node 1 twice"},
       {"   NODE   X   Y   Z\n\n", "", "no nodes"},
+      {"   NODE   X   Y   Z\n  1  0.0  0.0  0.0\n\n   NODF   X   Y   Z\n  2  0.0  0.0  0.0\n", ":5",
+       "without a header"},
       {"*NODE\n1, 0., 0.\n", ":2", "3 real numbers"},
       {"1,2,3,4\n2,3,4\n", ":2", "3 real numbers"},
   };
@@ -382,6 +384,9 @@ static void test_broken_nodes(void **state) {
   assert_non_null(strstr(why.where, "masters.txt:3"));
   write_text(path, "  NODE DOF\n  5 UX\n  5 UX\n");
   assert_int_equal(pb_dof_file_read(path, &rows, &why), PB_ERR_SYNTAX);
+  write_text(path, "  NODE DOF\n  5 UX\n\n  NODE DQF\n  5 UY\n");
+  assert_int_equal(pb_dof_file_read(path, &rows, &why), PB_ERR_SYNTAX);
+  assert_non_null(strstr(why.message, "without a header"));
   write_text(path, "  NODE LABEL SUPPORT\n  5 UX OFF\n  5 ROTZ OFF\n");
   REQUIRE(pb_dof_file_read(path, &rows, &err));
   assert_int_equal(rows.label[1].direction, 6);
