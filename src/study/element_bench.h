@@ -36,7 +36,7 @@ pb_status pb_joint_bench_build(const pb_element_source *source, double mass, pb_
 
 void pb_bench_model_clear(pb_bench_model *bench);
 
-// The part of the bench: component "part", or the connection "joint". [any]
+// The actuator of an actuator bench, component "part". [any]
 const pb_component *pb_bench_part(const pb_bench_model *bench);
 
 // Gain at 0 Hz from an input to an output by name; NaN where one is missing. *out infinite where
