@@ -112,8 +112,7 @@ static void springs_stand_for_element_joints(void **state) {
   clear(&s);
 }
 
-// A heavier payload lowers every mode; so little of the strut moves that f² m is nearly kept where
-// the payload's motion is all there is.
+// A heavier payload lowers every mode.
 static void mass_lowers_the_modes(void **state) {
   (void)state;
   series s = study(HEXAPOD, PB_STUDY_MASS, "0 1 25 50");
