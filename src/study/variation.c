@@ -9,6 +9,7 @@
 
 #include "base/text.h"
 #include "study/template_part.h"
+#include "study/variation_internal.h"
 
 static const pb_study_kind_facts kinds[PB_STUDY_KINDS] = {
     [PB_STUDY_BENDING] = {"bending", "k_f", "Nm/rad", "0,50,100,500"},
@@ -44,25 +45,11 @@ pb_status pb_variation_number(const pb_variation *v, double *out, pb_error *err)
   return PB_OK;
 }
 
-// ---- JSON ---------------------------------------------------------------------------------------
-
-// Sets or replaces a member; takes the value over.
-static pb_status put(cJSON *object, const char *key, cJSON *value, pb_error *err) {
-  cJSON_DeleteItemFromObjectCaseSensitive(object, key);
-  if (value && cJSON_AddItemToObject(object, key, value)) return PB_OK;
-  cJSON_Delete(value);
-  return pb_fail_memory(err, key);
-}
-
-static pb_status put_number(cJSON *object, const char *key, double value, pb_error *err) {
-  return put(object, key, cJSON_CreateNumber(value), err);
-}
-
 // ---- joints -------------------------------------------------------------------------------------
 
 static const char *const joint_key[2] = {"bottom_joint", "top_joint"};
 
-// Joint types by what they leave free: rows in the order ideal, with k_a; then what has everything.
+// Whether a joint of this type has the stiffness, or may be given it.
 static bool has_direction(const char *type, pb_study_kind kind) {
   bool bushing = !strcmp(type, "bushing"), spherical = !strncmp(type, "spherical", 9);
   if (kind == PB_STUDY_TORSION) return bushing || spherical;
@@ -80,8 +67,8 @@ static pb_status set_axial(cJSON *joint, const char *where, double value, pb_err
   const char *type = axial_type(pb_part_type(joint), isfinite(value));
   if (!type)
     return pb_fail(err, PB_ERR_STATE, where, "a bushing's axial direction cannot be locked");
-  pb_status status = put(joint, "type", cJSON_CreateString(type), err);
-  if (!status && isfinite(value)) return put_number(joint, "k_a", value, err);
+  pb_status status = pb_object_put(joint, "type", cJSON_CreateString(type), err);
+  if (!status && isfinite(value)) return pb_object_put_number(joint, "k_a", value, err);
   cJSON_DeleteItemFromObjectCaseSensitive(joint, "k_a");
   cJSON_DeleteItemFromObjectCaseSensitive(joint, "c_a");
   return status;
@@ -90,7 +77,7 @@ static pb_status set_axial(cJSON *joint, const char *where, double value, pb_err
 static pb_status set_stiffness(cJSON *joint, const char *where, pb_study_kind kind, double value,
                                pb_error *err) {
   if (kind == PB_STUDY_AXIAL) return set_axial(joint, where, value, err);
-  return put_number(joint, kind == PB_STUDY_BENDING ? "k_f" : "k_t", value, err);
+  return pb_object_put_number(joint, kind == PB_STUDY_BENDING ? "k_f" : "k_t", value, err);
 }
 
 // Sets a stiffness in one joint where it has the direction; *changed tells.
@@ -109,7 +96,7 @@ static pb_status vary_joint(const cJSON *file, cJSON *template, const char *key,
                 "place");
   *changed = !status && has_direction(type, kind);
   if (*changed) status = set_stiffness(joint, where, kind, value, err);
-  if (*changed && !status) return put(template, key, joint, err);
+  if (*changed && !status) return pb_object_put(template, key, joint, err);
   cJSON_Delete(joint);
   return status;
 }
@@ -178,7 +165,7 @@ static pb_status take_stiffness(const cJSON *file, const pb_variation *v, int si
         own_stiffness(file, joint_key[turn ? 1 - side : side], v->directory, key, &given, err);
     if (status) return status;
   }
-  if (isfinite(given)) return put_number(joint, key, given, err);
+  if (isfinite(given)) return pb_object_put_number(joint, key, given, err);
   return pb_fail(err, PB_ERR_ARGUMENT, joint_key[side],
                  "the joint model needs %s, which the plant's joints do not have (--joint-%s)", key,
                  key);
@@ -189,10 +176,10 @@ static pb_status make_joint(const cJSON *file, const struct joint_form *form, in
   const pb_joint_stiffness *k = &v->stiffness;
   cJSON *joint = cJSON_CreateObject();
   bool turns = strncmp(form->type[side], "universal", 9) != 0;
-  pb_status status = joint ? put(joint, "type", cJSON_CreateString(form->type[side]), err)
+  pb_status status = joint ? pb_object_put(joint, "type", cJSON_CreateString(form->type[side]), err)
                            : pb_fail_memory(err, "joint");
-  if (!status && !form->rotations) status = put_number(joint, "k_f", 0, err);
-  if (!status && !form->rotations && turns) status = put_number(joint, "k_t", 0, err);
+  if (!status && !form->rotations) status = pb_object_put_number(joint, "k_f", 0, err);
+  if (!status && !form->rotations && turns) status = pb_object_put_number(joint, "k_t", 0, err);
   if (!status && form->rotations) status = take_stiffness(file, v, side, "k_f", k->k_f, joint, err);
   if (!status && form->rotations && turns)
     status = take_stiffness(file, v, side, "k_t", k->k_t, joint, err);
@@ -229,96 +216,20 @@ static pb_status vary_joint_model(const cJSON *file, cJSON *template, const pb_v
     cJSON *joint = NULL;
     status = form ? make_joint(file, form, side, v, &joint, err)
                   : name_joint(file, v->text, side, &joint, err);
-    if (!status) status = put(template, joint_key[side], joint, err);
+    if (!status) status = pb_object_put(template, joint_key[side], joint, err);
   }
-  return status;
-}
-
-// ---- actuator models ----------------------------------------------------------------------------
-
-// The file's model of a type, the actuator itself if it is one. Fails where there is none, or more.
-static pb_status find_actuator(const cJSON *file, const char *type, cJSON **out, pb_error *err) {
-  const cJSON *models = pb_json_member(file, "models"), *found = NULL;
-  size_t count = 0;
-  pb_status status = pb_template_part(file, "actuator", out, err);
-  if (status || !strcmp(pb_part_type(*out), type)) return status;
-  cJSON_Delete(*out);
-  *out = NULL;
-  for (const cJSON *m = models ? models->child : NULL; m; m = m->next)
-    if (!strcmp(pb_part_type(m), type)) found = m, count++;
-  if (count != 1)
-    return pb_fail(err, PB_ERR_STATE, "/models", "%s of type %s; name the one that is meant",
-                   count ? "there are several models" : "neither the actuator nor a model is",
-                   type);
-  *out = cJSON_Duplicate(found, 1);
-  return *out ? PB_OK : pb_fail_memory(err, "/models");
-}
-
-static double number_of(const cJSON *part, const char *key) {
-  const cJSON *item = pb_json_member(part, key);
-  return cJSON_IsNumber(item) ? item->valuedouble : 0;
-}
-
-// The strut that a 2-DoF actuator is below the motion of its intermediate mass: shell and stacks in
-// parallel, the stacks' springs in series, dampers weighed by the static shape.
-static pb_status simplify(const cJSON *apa, cJSON **out, pb_error *err) {
-  double ka = number_of(apa, "k_a"), ke = number_of(apa, "k_e");
-  double lower = ke / (ka + ke), upper = ka / (ka + ke);  // share of the elongation
-  cJSON *strut = cJSON_CreateObject();
-  *out = strut;
-  if (!strut) return pb_fail_memory(err, "actuator");
-  pb_status status = put(strut, "type", cJSON_CreateString("strut_1dof"), err);
-  if (!status) status = put_number(strut, "k", number_of(apa, "k_1") + ka * lower, err);
-  double c = number_of(apa, "c_1") + number_of(apa, "c_a") * lower * lower +
-             number_of(apa, "c_e") * upper * upper;
-  if (!status) status = put_number(strut, "c", c, err);
-  double mass = number_of(apa, "mass") + number_of(apa, "intermediate_mass");
-  if (!status) status = put_number(strut, "mass", mass, err);
-  return status ? status : put_number(strut, "radius", number_of(apa, "radius"), err);
-}
-
-static pb_status make_1dof(const cJSON *file, cJSON **out, pb_error *err) {
-  cJSON *own = NULL;
-  pb_status status = pb_template_part(file, "actuator", &own, err);
-  if (!status && !strcmp(pb_part_type(own), "strut_1dof")) {
-    *out = own;
-    return PB_OK;
-  }
-  cJSON_Delete(own);
-  own = NULL;
-  if (!status) status = find_actuator(file, "apa_2dof", &own, err);
-  if (!status) status = simplify(own, out, err);
-  cJSON_Delete(own);
-  return status;
-}
-
-static pb_status vary_actuator_model(const cJSON *file, cJSON *template, const char *name,
-                                     pb_error *err) {
-  cJSON *actuator = NULL;
-  const cJSON *model;
-  pb_status status;
-  if (!strcmp(name, "1dof"))
-    status = make_1dof(file, &actuator, err);
-  else if (!strcmp(name, "2dof"))
-    status = find_actuator(file, "apa_2dof", &actuator, err);
-  else {
-    status = pb_file_model_find(file, name, &model, err);
-    actuator = cJSON_CreateString(name);
-  }
-  if (!status) return put(template, "actuator", actuator, err);
-  cJSON_Delete(actuator);
   return status;
 }
 
 // ---- the payload --------------------------------------------------------------------------------
 
 static pb_status vary_mass(cJSON *template, double mass, pb_error *err) {
-  if (mass == 0) return put(template, "payload", cJSON_CreateNull(), err);
+  if (mass == 0) return pb_object_put(template, "payload", cJSON_CreateNull(), err);
   cJSON *payload = cJSON_GetObjectItemCaseSensitive(template, "payload");
   if (!cJSON_IsObject(payload))
     return pb_fail(err, PB_ERR_STATE, "/template/payload",
                    "the plant has no payload, so its size is not known");
-  return put_number(payload, "mass", mass, err);
+  return pb_object_put_number(payload, "mass", mass, err);
 }
 
 // ---- all of them --------------------------------------------------------------------------------
@@ -339,7 +250,7 @@ pb_status pb_variation_apply(const cJSON *file, const pb_variation *v, cJSON **o
   else if (v->kind == PB_STUDY_JOINT_MODEL)
     status = vary_joint_model(file, template, v, err);
   else if (v->kind == PB_STUDY_ACTUATOR_MODEL)
-    status = vary_actuator_model(file, template, v->text, err);
+    status = pb_vary_actuator_model(file, template, v->text, err);
   else if (v->kind == PB_STUDY_MASS)
     status = vary_mass(template, value, err);
   else

@@ -95,8 +95,24 @@ static void orders_are_those_of_the_report(void **state) {
   clear(&s);
 }
 
-// A heavier payload lowers every mode; so little of the strut moves that f² m is nearly kept where
-// the payload's motion is all there is.
+// Section 3.5, fig. 3.8: springs with the stiffnesses of the shipped element damp as it does.
+static void springs_stand_for_element_joints(void **state) {
+  (void)state;
+  series s = study(PB_CONFIG "/plants/nano-hexapod-element-joints.json", PB_STUDY_JOINT_MODEL,
+                   "axial plant");
+  const pb_study_point *spring = &s.point[0], *element = &s.point[1];
+  assert_int_equal(spring->states, 48);
+  assert_int_equal(element->states, 252);
+  ASSERT_RELATIVE(spring->struts.bending, element->struts.bending, 1e-9);
+  ASSERT_RELATIVE(element->struts.bending, 4.83, 0.02);
+  for (size_t m = 0; m < 6; m++) {
+    ASSERT_RELATIVE(spring->mode_hz[m], element->mode_hz[m], 0.03);
+    ASSERT_RELATIVE(spring->attainable[m], element->attainable[m], 0.06);
+  }
+  clear(&s);
+}
+
+// A heavier payload lowers every mode.
 static void mass_lowers_the_modes(void **state) {
   (void)state;
   series s = study(HEXAPOD, PB_STUDY_MASS, "0 1 25 50");
@@ -158,6 +174,7 @@ int main(void) {
       cmocka_unit_test(bending_hardly_matters_with_the_2dof_actuator),
       cmocka_unit_test(axial_stiffness_of_100_newtons_a_micrometre_is_enough),
       cmocka_unit_test(orders_are_those_of_the_report),
+      cmocka_unit_test(springs_stand_for_element_joints),
       cmocka_unit_test(mass_lowers_the_modes),
       cmocka_unit_test(torsion_takes_damping),
       cmocka_unit_test(the_condition_has_the_reports_numbers),
