@@ -220,7 +220,7 @@ static void hac_lac_hosted_is_as_predicted(void **state) {
   char line[400];
   snprintf(line, sizeof line,
            "run --json --hosted --bandwidth 200 --iff-gain 400 --frame cartesian --resolution 10 "
-           "--band 10,300 --settle 1.5 --no-undamped -o %s",
+           "--band 10,300 --settle 1 --no-undamped -o %s",
            directory);
   cJSON *json = tool_json(TOOL, daemon.domain, NULL, line, 0);
   check_stage(json, "iff");
@@ -249,7 +249,7 @@ static void hac_lac_over_the_bus_is_as_predicted(void **state) {
   e2e_daemon daemon = e2e_daemon_start(HEXAPOD, NULL);
   cJSON *json = tool_json(TOOL, daemon.domain, NULL,
                           "run --json --bandwidth 200 --iff-gain 400 --resolution 20 --band 20,300 "
-                          "--no-undamped --disturbance Fx",
+                          "--settle 0.5 --no-undamped --disturbance Fx",
                           0);
   check_stage(json, "iff");
   check_stage(json, "hac");
