@@ -23,7 +23,7 @@ int control_metrology_of(const pb_model *model, size_t input) {
 }
 
 static pb_status choose_actuators(control_design *d, pb_error *err) {
-  const iff_options *o = &d->options->iff;
+  const iff_options *o = &d->iff_options;
   if (d->damped) return iff_prepare(o, &d->plant->bench, &d->iff, err);
   iff_loops *l = &d->iff.loops;
   if (o->outputs.count == 0 && o->inputs.count > 0) {

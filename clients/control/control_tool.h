@@ -67,8 +67,9 @@ typedef struct control_design {
   const control_options *options;
   const control_plant *plant;
   const pb_model *model;
-  iff_result iff;  // its loops always; the rest where IFF is used
-  bool damped;     // IFF is used
+  iff_options iff_options;  // those of the command line, with the delay of a hosted controller
+  iff_result iff;           // its loops always; the rest where IFF is used
+  bool damped;              // IFF is used
   size_t n;
   pb_hac_channels channels;
   size_t *metrology;             // [n] outputs

@@ -99,6 +99,8 @@ static void choose_delays(control_design *d) {
   bool late = d->plant->bench.realtime && !o->hosted;
   d->iff_delay = o->iff.delay >= 0 ? (unsigned)o->iff.delay : 0;
   d->hac_delay = o->iff.delay >= 0 ? (unsigned)o->iff.delay : late;
+  d->iff_options = o->iff;
+  d->iff_options.delay = (int)d->iff_delay;
 }
 
 pb_status control_design_make(const control_options *options, const control_plant *plant,

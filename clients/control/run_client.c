@@ -54,14 +54,14 @@ static pb_status attach(hac_client *c, bool realtime, pb_error *err) {
 
 pb_status hac_client_start(const control_design *d, bool realtime, hac_client **out,
                            pb_error *err) {
-  const pb_common_options *common = &d->options->iff.common;
   hac_client *c = *out = calloc(1, sizeof *c);
   if (!c) return pb_fail_memory(err, "hac");
   c->design = d;
   c->x = calloc(d->hac.nx + 1, sizeof *c->x);
   c->scratch = calloc(d->hac.nx + 1, sizeof *c->scratch);
   c->y = calloc(d->n, sizeof *c->y);
-  const pb_session_options options = {.domain = common->domain, .plant = common->plant};
+  const pb_session_options options = {.domain = d->options->iff.common.domain,
+                                      .plant = d->plant->bench.description->name};
   pb_status status = c->x && c->scratch && c->y ? pb_session_open(&options, &c->session, err)
                                                 : pb_fail_memory(err, "hac");
   if (status == PB_OK) status = attach(c, realtime, err);
