@@ -11,7 +11,7 @@
 #include "bench.h"
 #include "../server/fpenv.h"
 #include "dense.h"
-#include "model/model.h"
+#include "model/step_kernel.h"
 #include "peaks.h"
 #include "plants.h"
 
@@ -140,6 +140,35 @@ static double measure(bench *b, const tables *t, const bench_plant *plant) {
   return r.ratio.median;
 }
 
+static const bench_column variant_columns[] = {
+    {"states", "states", NULL, 4},     {"plain", "plain loops", "ns", 4},
+    {"portable", "portable", "ns", 4}, {"avx2", "avx2", "ns", 4},
+    {"avx512f", "avx512f", "ns", 4},
+};
+
+// The same step by each kernel that this processor has, and by the plain loops.
+static void measure_variants(bench *b, bench_table *table, const bench_plant *plant) {
+  const double seconds = bench_quick(b) ? 0.05 : 0.2;
+  pb_model *m = plant->model;
+  pb_step_pack *pack = m->step;
+  const pb_step_kernel *kernel[3], *chosen = pack->kernel;
+  const size_t kernels = pb_step_kernels(kernel);
+  double value[] = {(double)m->nx, NAN, NAN, NAN, NAN};
+  subject s = subject_open(plant);
+  m->step = NULL;
+  value[1] = 1e9 * bench_measure(step_ours, &s, seconds).median;
+  m->step = pack;
+  for (size_t k = 0; k < kernels; k++)
+    for (size_t c = 2; c < sizeof value / sizeof *value; c++) {
+      if (strcmp(kernel[k]->name, variant_columns[c].key) != 0) continue;
+      pack->kernel = kernel[k];
+      value[c] = 1e9 * bench_measure(step_ours, &s, seconds).median;
+    }
+  pack->kernel = chosen;
+  bench_row(table, plant->name, value);
+  subject_close(&s);
+}
+
 static const bench_column peak_columns[] = {{"value", "measured", NULL, 4}};
 
 static roofs measure_roofs(bench *b) {
@@ -179,6 +208,10 @@ int main(int argc, char **argv) {
       bench_goal(b, what, ratio, BENCH_AT_LEAST, goal[g].ratio);
     }
   }
+  bench_table *variants =
+      bench_table_add(b, "variants", "One step by instruction set; all give the same bits", "plant",
+                      sizeof variant_columns / sizeof *variant_columns, variant_columns);
+  for (size_t k = 0; k < plants.count; k++) measure_variants(b, variants, &plants.item[k]);
   for (size_t g = 0; g < sizeof goal / sizeof *goal; g++)
     if (!bench_plants_find(&plants, goal[g].states))
       bench_note(b, "No plant with about %zu states was measured.", goal[g].states);
