@@ -104,6 +104,21 @@ static void measure_kind(bench *b, bench_table *t, bench_table *lengths, const c
   add_row(t, "multisine, step by step", best, &o);
 }
 
+// The same kind at longer and longer periods: what an experiment costs with its length.
+static void measure_growth(bench *b, const char *domain, const bench_column *column) {
+  static const attempt lengths[] = {{"4", "2"}, {"0.5", "2"}, {"0.125", "2"}, {"0.05", "2"}};
+  bench_table *t =
+      bench_table_add(b, "growth", "Multisine, longer and longer", "lines every", 4, column);
+  for (int k = 0; k < (bench_quick(b) ? 3 : 4); k++) {
+    const outcome o = identify(domain, "multisine", &lengths[k], true, -1);
+    char name[32];
+    snprintf(name, sizeof name, "%s Hz", lengths[k].resolution);
+    bench_row(t, name, (double[]){o.experiment, o.error, o.wall, o.total});
+  }
+  bench_growth(b, t, "experiment", "wall", 0);
+  bench_growth(b, t, "experiment", "total", 0);
+}
+
 int main(int argc, char **argv) {
   bench *b = bench_begin(argc, argv, "identify",
                          "How long must an experiment be for a frequency response within 1 %?");
@@ -124,8 +139,7 @@ int main(int argc, char **argv) {
       bench_table_add(b, "lengths", "Experiments tried", "excitation", 4, length_columns);
   for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++)
     measure_kind(b, t, lengths, domain, &kinds[k]);
-  bench_growth(b, lengths, "experiment", "wall", 0);
-  bench_growth(b, lengths, "experiment", "total", 0);
+  measure_growth(b, domain, length_columns);
   bench_child_end(&daemon, SIGTERM);
   return bench_end(b);
 }

@@ -11,7 +11,7 @@
 #include "bench.h"
 #include "../server/fpenv.h"
 #include "dense.h"
-#include "model/model.h"
+#include "model/step_kernel.h"
 #include "peaks.h"
 #include "plants.h"
 
@@ -113,7 +113,7 @@ typedef struct roofs {
 } roofs;
 
 typedef struct tables {
-  bench_table *step, *roof;
+  bench_table *step, *roof, *growth;
   roofs peak;
 } tables;
 
@@ -135,9 +135,40 @@ static double measure(bench *b, const tables *t, const bench_plant *plant) {
             (double[]){states, flops, bytes, flops / bytes, flops / ns,
                        100e9 * flops / ns / t->peak.apart, bytes / ns,
                        100 * bytes / ns / bandwidth});
+  if (m->nu == 12 && m->ny == 18)
+    bench_row(t->growth, plant->name, (double[]){states, ns, 1e9 * r.baseline.median});
   if (!isfinite(s.sum)) bench_fail("%s: the outputs overflowed", plant->name);
   subject_close(&s);
   return r.ratio.median;
+}
+
+static const bench_column variant_columns[] = {
+    {"states", "states", NULL, 4},     {"plain", "plain loops", "ns", 4},
+    {"portable", "portable", "ns", 4}, {"avx2", "avx2", "ns", 4},
+    {"avx512f", "avx512f", "ns", 4},
+};
+
+// The same step by each kernel that this processor has, and by the plain loops.
+static void measure_variants(bench *b, bench_table *table, const bench_plant *plant) {
+  const double seconds = bench_quick(b) ? 0.05 : 0.2;
+  pb_model *m = plant->model;
+  pb_step_pack *pack = m->step;
+  const pb_step_kernel *kernel[3], *chosen = pack->kernel;
+  const size_t kernels = pb_step_kernels(kernel);
+  double value[] = {(double)m->nx, NAN, NAN, NAN, NAN};
+  subject s = subject_open(plant);
+  m->step = NULL;
+  value[1] = 1e9 * bench_measure(step_ours, &s, seconds).median;
+  m->step = pack;
+  for (size_t k = 0; k < kernels; k++)
+    for (size_t c = 2; c < sizeof value / sizeof *value; c++) {
+      if (strcmp(kernel[k]->name, variant_columns[c].key) != 0) continue;
+      pack->kernel = kernel[k];
+      value[c] = 1e9 * bench_measure(step_ours, &s, seconds).median;
+    }
+  pack->kernel = chosen;
+  bench_row(table, plant->name, value);
+  subject_close(&s);
 }
 
 static const bench_column peak_columns[] = {{"value", "measured", NULL, 4}};
@@ -170,6 +201,9 @@ int main(int argc, char **argv) {
                            sizeof step_columns / sizeof *step_columns, step_columns);
   t.roof = bench_table_add(b, "roofline", "What a step needs, and how fast it gets it", "plant",
                            sizeof roof_columns / sizeof *roof_columns, roof_columns);
+  t.growth =
+      bench_table_add(b, "growth", "One step of the hexapods: 12 inputs, 18 outputs", "plant", 3,
+                      (bench_column[]){step_columns[0], step_columns[3], step_columns[4]});
   for (size_t k = 0; k < plants.count; k++) {
     double ratio = measure(b, &t, &plants.item[k]);
     for (size_t g = 0; g < sizeof goal / sizeof *goal; g++) {
@@ -179,11 +213,15 @@ int main(int argc, char **argv) {
       bench_goal(b, what, ratio, BENCH_AT_LEAST, goal[g].ratio);
     }
   }
+  bench_table *variants =
+      bench_table_add(b, "variants", "One step by instruction set; all give the same bits", "plant",
+                      sizeof variant_columns / sizeof *variant_columns, variant_columns);
+  for (size_t k = 0; k < plants.count; k++) measure_variants(b, variants, &plants.item[k]);
   for (size_t g = 0; g < sizeof goal / sizeof *goal; g++)
     if (!bench_plants_find(&plants, goal[g].states))
       bench_note(b, "No plant with about %zu states was measured.", goal[g].states);
-  bench_growth(b, t.step, "states", "ns", 48);
-  bench_growth(b, t.step, "states", "dense_ns", 48);
+  bench_growth(b, t.growth, "states", "ns", 48);
+  bench_growth(b, t.growth, "states", "dense_ns", 48);
   bench_plants_free(&plants);
   return bench_end(b);
 }

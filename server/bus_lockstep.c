@@ -130,24 +130,31 @@ static void command_over(pb_daemon *d, uint64_t session, const dds_sample_info_t
   pb_engine_drop(&d->engine, member, PB_EVENT_LOST, why);
 }
 
+enum { BATCH = 8 };  // commands taken at once
+
+// Fewer than asked for means that no more are there: what comes later calls again. To ask once more
+// in vain would cost a hundredth of a round trip.
 bool pb_bus_take_commands(pb_daemon *d, uint64_t *for_step) {
   bool accepted = false;
+  plantbus_Command command[BATCH];
+  void *sample[BATCH];
+  dds_sample_info_t info[BATCH];
+  for (int i = 0; i < BATCH; i++) sample[i] = &command[i];
   for (;;) {
-    plantbus_Command command;
-    void *sample[1] = {&command};
-    dds_sample_info_t info;
-    if (dds_take(d->command, sample, &info, 1, 1) != 1) return accepted;
-    if (info.valid_data) {
-      if (command_judge(d, &command, info.publication_handle)) {
+    const dds_return_t count = dds_take(d->command, sample, info, BATCH, BATCH);
+    for (dds_return_t i = 0; i < count; i++) {
+      const plantbus_Command *c = &command[i];
+      if (info[i].valid_data && command_judge(d, c, info[i].publication_handle)) {
         accepted = true;
-        if (for_step) *for_step = command.step ? command.step : UINT64_MAX;
+        if (for_step) *for_step = c->step ? c->step : UINT64_MAX;
+      }
+      // Told with the last command when that was still here.
+      if (info[i].instance_state != DDS_IST_ALIVE) {
+        command_over(d, c->session, &info[i]);
+        accepted = true;  // the inputs may have changed
       }
     }
-    // Told with the last command when that was still here.
-    if (info.instance_state != DDS_IST_ALIVE) {
-      command_over(d, command.session, &info);
-      accepted = true;  // the inputs may have changed
-    }
+    if (count < BATCH) return accepted;
   }
 }
 

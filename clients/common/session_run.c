@@ -101,6 +101,7 @@ static void samples_take(pb_session *s) {
       s->run.behind = i + 1 < count;
       if (info[i].valid_data) sample_answer(s, &x[i]);
     }
+    if (count < BATCH) return;  // no more are there; the next one calls again
   }
 }
 

@@ -139,11 +139,49 @@ static void what_a_block_may_not(void **state) {
   e2e_daemon_end(&daemon);
 }
 
+// The answer of this client's block, once it is there.
+static bool block_answered(void *context) {
+  void *sample[1] = {NULL};
+  dds_sample_info_t info;
+  if (dds_take(*(dds_entity_t *)context, sample, &info, 1, 1) != 1) return false;
+  const plantbus_BlockReply *r = sample[0];
+  const bool ours = info.valid_data && r->id == 1 && r->steps == 3;
+  dds_return_loan(*(dds_entity_t *)context, sample, 1);
+  return ours;
+}
+
+static bool three_steps_taken(void *context) {
+  void *sample[1] = {NULL};
+  dds_sample_info_t info;
+  if (dds_take(*(dds_entity_t *)context, sample, &info, 1, 1) != 1) return false;
+  const bool taken = info.valid_data && ((const plantbus_Sample *)sample[0])->step == 3;
+  dds_return_loan(*(dds_entity_t *)context, sample, 1);
+  return taken;
+}
+
+// A block is served once, and the match with its client's reader may be completed after that.
+static void an_answer_survives_a_late_match(void **state) {
+  (void)state;
+  e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, NULL);
+  const e2e_raw raw = e2e_raw_join(&daemon);
+  dds_entity_t samples = e2e_raw_reader(&raw, PB_TOPIC_SAMPLE);
+  const dds_entity_t writer = e2e_raw_writer(&raw, PB_TOPIC_BLOCK_REQUEST);
+  plantbus_BlockRequest request = {.id = 1, .step = UINT64_MAX, .steps = 3};
+  memcpy(request.client, raw.client, sizeof request.client);
+  assert_int_equal(dds_write(writer, &request), DDS_RETCODE_OK);
+  e2e_until(three_steps_taken, &samples, "the block's steps");
+  dds_entity_t reader = e2e_raw_reader(&raw, PB_TOPIC_BLOCK_REPLY);
+  e2e_until(block_answered, &reader, "the block's answer");
+  dds_delete(raw.participant);
+  e2e_daemon_end(&daemon);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_block_is_its_steps),
       cmocka_unit_test(the_hash_tells_two_runs_apart),
       cmocka_unit_test(what_a_block_may_not),
+      cmocka_unit_test(an_answer_survives_a_late_match),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
