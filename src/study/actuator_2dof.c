@@ -17,7 +17,8 @@ static void continuous(const pb_apa_2dof *p, double complex s, double complex h[
   h[PB_APA_VS] = p->g_a * p->g_s * (ke - a) / det;
 }
 
-// States z, e = z − w, ż, ė: V_s is a state, not a small difference of two.
+// States z, e = z − w, ż/ω_z, ė/ω_e: V_s is a state, not a small difference of two, and all weigh
+// alike, so that the exponential keeps its digits.
 static void fill_states(const pb_apa_2dof *p, double a[16], double b[4]) {
   const double up = 1 / p->moving, in = 1 / p->inner;
   memset(a, 0, 16 * sizeof *a);
@@ -32,13 +33,18 @@ static void fill_states(const pb_apa_2dof *p, double a[16], double b[4]) {
   a[3 + 4 * 2] = a[2 + 4 * 2] + p->c_a * in;
   a[3 + 4 * 3] = a[2 + 4 * 3] - (p->c_a + p->c_e) * in;
   b[3] = -p->g_a * in;
+  const double scale[4] = {1, 1, sqrt((p->k_1 + p->k_e) * up), sqrt((p->k_a + p->k_e) * in)};
+  for (int i = 0; i < 4; i++) {
+    for (int j = 0; j < 4; j++) a[i + 4 * j] *= scale[j] / scale[i];
+    b[i] /= scale[i];
+  }
 }
 
-// (λ − A_d) x = b by elimination with pivots.
-static void solve4(const double *ad, double complex lambda, const double *b, double complex x[4]) {
+// (λ − A) x = b by elimination with pivots.
+static void solve4(const double *a, double complex lambda, const double *b, double complex x[4]) {
   double complex m[4][5];
   for (int i = 0; i < 4; i++) {
-    for (int j = 0; j < 4; j++) m[i][j] = (i == j ? lambda : 0) - ad[i + 4 * j];
+    for (int j = 0; j < 4; j++) m[i][j] = (i == j ? lambda : 0) - a[i + 4 * j];
     m[i][4] = b[i];
   }
   for (int k = 0; k < 4; k++) {
@@ -62,36 +68,48 @@ static void solve4(const double *ad, double complex lambda, const double *b, dou
   }
 }
 
-// A_d and B_d of the zero-order hold.
-static pb_status sample(const pb_apa_2dof *p, double sample_rate, double ad[16], double bd[4],
+// A_d − 1 = A ∫ e^{As} ds and B_d of the zero-order hold. With z − 1 beside it no digits are lost
+// where z is near 1.
+static pb_status sample(const pb_apa_2dof *p, double sample_rate, double turned[16], double bd[4],
                         pb_error *err) {
-  double a[16], b[4], gd[16];
+  double a[16], b[4], ad[16], gd[16];
   fill_states(p, a, b);
   pb_status st = pb_block_discretize(4, a, 1 / sample_rate, ad, gd, err);
   for (int i = 0; i < 4; i++) {
     bd[i] = 0;
-    for (int j = 0; j < 4 && !st; j++) bd[i] += gd[i + 4 * j] * b[j];
+    for (int j = 0; j < 4 && !st; j++) {
+      bd[i] += gd[i + 4 * j] * b[j];
+      turned[i + 4 * j] = 0;
+      for (int k = 0; k < 4; k++) turned[i + 4 * j] += a[i + 4 * k] * gd[k + 4 * j];
+    }
   }
   return st;
 }
 
-static void sampled(const pb_apa_2dof *p, const double *ad, const double *bd, double complex z,
+// e^w − 1
+static double complex turn(double complex w) {
+  const double x = creal(w), y = cimag(w), half = sin(0.5 * y);
+  return expm1(x) * cos(y) - 2 * half * half + I * (exp(x) * sin(y));
+}
+
+// At z = e^w.
+static void sampled(const pb_apa_2dof *p, const double *turned, const double *bd, double complex w,
                     double complex h[2]) {
   double complex x[4];
-  solve4(ad, z, bd, x);
+  solve4(turned, turn(w), bd, x);
   h[PB_APA_Y] = x[0];
   h[PB_APA_VS] = p->g_s * x[1];
 }
 
 pb_status pb_apa_2dof_response(const pb_apa_2dof *p, double sample_rate, const double *hz,
                                size_t nf, double complex *h, pb_error *err) {
-  double ad[16], bd[4];
-  pb_status st = sample_rate > 0 ? sample(p, sample_rate, ad, bd, err) : PB_OK;
+  double turned[16], bd[4];
+  pb_status st = sample_rate > 0 ? sample(p, sample_rate, turned, bd, err) : PB_OK;
   for (size_t f = 0; f < nf && !st; f++) {
     double complex *at = h + PB_APA_OUTPUTS * f;
     const double complex s = I * two_pi * hz[f];
     if (sample_rate > 0)
-      sampled(p, ad, bd, cexp(s / sample_rate), at);
+      sampled(p, turned, bd, s / sample_rate, at);
     else
       continuous(p, s, at);
     if (!isfinite(cabs(at[PB_APA_Y])) || !isfinite(cabs(at[PB_APA_VS])))
@@ -103,14 +121,14 @@ pb_status pb_apa_2dof_response(const pb_apa_2dof *p, double sample_rate, const d
 // The secant method: the response is smooth around its zero.
 pb_status pb_apa_2dof_sampled_zero(const pb_apa_2dof *p, double sample_rate, double complex start,
                                    double complex *zero, pb_error *err) {
-  double ad[16], bd[4];
+  double turned[16], bd[4];
   double complex h[2], s0 = start * (1 + 1e-4), s1 = start;
-  pb_status st = sample(p, sample_rate, ad, bd, err);
+  pb_status st = sample(p, sample_rate, turned, bd, err);
   if (st) return st;
-  sampled(p, ad, bd, cexp(s0 / sample_rate), h);
+  sampled(p, turned, bd, s0 / sample_rate, h);
   double complex h0 = h[PB_APA_VS];
   for (int k = 0; k < 50; k++) {
-    sampled(p, ad, bd, cexp(s1 / sample_rate), h);
+    sampled(p, turned, bd, s1 / sample_rate, h);
     const double complex h1 = h[PB_APA_VS], step = h1 * (s1 - s0) / (h1 - h0);
     if (h1 == 0 || cabs(s1 - s0) < 1e-10 * cabs(s1)) {
       *zero = s1;
