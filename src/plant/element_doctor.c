@@ -113,8 +113,12 @@ static pb_status treat_mass(const char *name, pb_element_data *w, pb_diagnosis *
   return curable ? pb_cure_mass(name, w, fmax(-d->mass_smallest, 1e-9), err) : PB_OK;
 }
 
+// Few digits show in the rigid motions first; numbers that are merely round harm nobody.
+static bool digits_lost(const pb_diagnosis *d, double rigid, double flexible) {
+  return (d->digits_k <= 8 || d->digits_m <= 8) && fabs(rigid) > 1e-4 * fabs(flexible);
+}
+
 static void note_digits(pb_diagnosis *d) {
-  if (d->digits_k > 8 && d->digits_m > 8) return;
   pb_finding *f = pb_doctor_note(d, PB_FINDING_FEW_DIGITS, true);
   snprintf(f->saw, sizeof f->saw, "K has %d and M %d significant digits", d->digits_k, d->digits_m);
   snprintf(f->would, sizeof f->would,
@@ -196,26 +200,22 @@ static pb_status treat_frames(const char *name, pb_element_data *w, pb_diagnosis
   return pb_doctor_place(name, w, tolerance, d, err);
 }
 
-static bool has(const pb_diagnosis *d, pb_finding_code code) {
-  for (size_t k = 0; k < d->findings; k++)
-    if (d->finding[k].code == code) return true;
-  return false;
-}
-
 static bool curable(const pb_diagnosis *d) {
   for (size_t k = 0; k < d->findings; k++)
     if (!d->finding[k].curable) return false;
   return true;
 }
 
-static pb_status treat_rigid(const char *name, pb_element_data *w, const pb_doctor_options *options,
-                             pb_diagnosis *d, pb_error *err) {
+static pb_status treat_rigid(const char *name, pb_element_data *w, const double *omega2,
+                             const pb_doctor_options *options, pb_diagnosis *d, pb_error *err) {
   double rigid[6], flexible;
   if (!curable(d)) return PB_OK;
-  pb_status st = measure_rigid_hz(name, w, NULL, rigid, &flexible, err);
+  const double *known = d->findings ? NULL : omega2;  // what was found was cured: w is another
+  pb_status st = measure_rigid_hz(name, w, known, rigid, &flexible, err);
   if (st) return st;
-  bool bad = !moves_freely(rigid, flexible);
-  if (!bad && !has(d, PB_FINDING_FEW_DIGITS)) return PB_OK;
+  const bool bad = !moves_freely(rigid, flexible), lost = digits_lost(d, rigid[5], flexible);
+  if (!bad && !lost) return PB_OK;
+  if (lost) note_digits(d);
   st = pb_cure_rigid(name, w, options->weighted, &d->change, err);
   if (st || !bad) return st;
   pb_finding *f = pb_doctor_note(d, PB_FINDING_RIGID_MOTIONS, d->change < 0.02);
@@ -243,12 +243,11 @@ static pb_status walk(const char *name, pb_element_data *w, const double *omega2
   treat_half(w->m, n, "M", d);
   treat_asymmetry(w->k, n, "K", d->digits_k, d);
   treat_asymmetry(w->m, n, "M", d->digits_m, d);
-  note_digits(d);
   pb_status st = omega2 ? PB_OK : treat_mass(name, w, d, err);
   if (!st) st = measure_rigid_hz(name, w, omega2, d->rigid_hz, &d->flexible_hz, err);
   if (!st) st = treat_frames(name, w, d, err);
   if (!st) treat_units(w, options, d);
-  if (!st) st = treat_rigid(name, w, options, d, err);
+  if (!st) st = treat_rigid(name, w, omega2, options, d, err);
   return st;
 }
 

@@ -4,6 +4,7 @@
 // the plant to be reset, reconfigured and switched between its modes: whatever ends a run, it tries
 // again, with the same session or a new one. At its end it tells what it met.
 #include <math.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -123,6 +124,10 @@ int main(int argc, char **argv) {
       .options = {.domain = (uint32_t)atoi(argv[1]), .plant = argv[2], .timeout = 5.0}};
   pb_random_seed(&c.random, strtoull(argv[3], NULL, 10), 0);
   pb_interrupt_install();
+  sigset_t end;  // the driver has it wait until here
+  sigemptyset(&end);
+  sigaddset(&end, SIGTERM);
+  sigprocmask(SIG_UNBLOCK, &end, NULL);
   work(&c);
   printf("client: sessions %llu attaches %llu refused %llu runs %llu broken %llu evicted %llu "
          "changed %llu samples %llu bad %llu\n",

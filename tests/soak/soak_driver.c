@@ -57,7 +57,13 @@ static void client_start(soak *s, soak_client *member) {
   snprintf(seed, sizeof seed, "%llu", (unsigned long long)(s->seed * 1000003 + s->started++));
   const char *const argv[] = {s->client, domain, pb_session_description(s->session)->name, seed,
                               NULL};
+  // A signal that comes before the client has its handler waits for it.
+  sigset_t end, before;
+  sigemptyset(&end);
+  sigaddset(&end, SIGTERM);
+  sigprocmask(SIG_BLOCK, &end, &before);
   *member = (soak_client){.pid = soak_spawn(argv, s->client_out, s->client_out)};
+  sigprocmask(SIG_SETMASK, &before, NULL);
 }
 
 // One that ended by itself has found something: its output tells.
