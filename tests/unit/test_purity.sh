@@ -11,3 +11,14 @@ if [ -n "$found" ]; then
   echo "$found"
   exit 1
 fi
+
+# CHOLMOD's supernodal module is GPL: src/part is for plantbus-part, its tests and its measurement only.
+cd "$1" || exit 1
+found=$(grep -rlE --include='CMakeLists.txt' --include='*.cmake' --include='*.c' --include='*.h' \
+  'plantbus_part|[Cc][Hh][Oo][Ll][Mm][Oo][Dd]' src server idl clients tests bench |
+  grep -vE '^(src|clients|tests)/part/|^bench/(reduction|bench_reduction)')
+if [ -n "$found" ]; then
+  echo "only plantbus-part may link CHOLMOD (GPL):"
+  echo "$found"
+  exit 1
+fi
