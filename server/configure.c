@@ -1,6 +1,7 @@
 // From a request to a changed plant: see configure.h. All by the service thread.
 #include "configure.h"
 
+#include <malloc.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -218,6 +219,7 @@ static void model_made(pb_daemon *d) {
   p->job.next = NULL;  // it is the live one
   pending_clear(p);
   pb_revision_free(old);
+  malloc_trim(0);  // what was small in it is scattered over the heap
 }
 
 static void model_failed(pb_daemon *d, const pb_error *err) {
