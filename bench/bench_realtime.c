@@ -94,8 +94,7 @@ static double growth_of(const cJSON *before, const cJSON *after, const char *pat
   return bench_json_number(after, path) - bench_json_number(before, path);
 }
 
-static served measure_served(const bench_plant *plant, double rate, double seconds) {
-  const uint32_t number = bench_domain();
+static bench_child daemon_start(const bench_plant *plant, double rate, uint32_t number) {
   char domain[16], speed[32], priority[16], line[512];
   snprintf(domain, sizeof domain, "%u", number);
   snprintf(speed, sizeof speed, "%.6g", rate / plant->model->sample_rate);
@@ -113,8 +112,16 @@ static served measure_served(const bench_plant *plant, double rate, double secon
                         priority,
                         "--lock-memory",
                         NULL};
-  bench_child daemon = bench_spawn(argv, -1), client[CONTROLLERS];
+  bench_child daemon = bench_spawn(argv, -1);
   if (!bench_child_line(&daemon, "ready", line, 60)) bench_fail("the daemon did not start");
+  return daemon;
+}
+
+static served measure_served(const bench_plant *plant, double rate, double seconds) {
+  const uint32_t number = bench_domain();
+  char domain[16];
+  snprintf(domain, sizeof domain, "%u", number);
+  bench_child daemon = daemon_start(plant, rate, number), client[CONTROLLERS];
   bench_client_task task[CONTROLLERS];
   for (int k = 0; k < CONTROLLERS; k++) {
     task[k] = (bench_client_task){number, k, false, seconds};
@@ -140,6 +147,76 @@ static served measure_served(const bench_plant *plant, double rate, double secon
   bench_child_end(&daemon, SIGTERM);
   return s;
 }
+
+// ---- the plant while it is changed --------------------------------------------------------------
+
+typedef struct changing {
+  double quiet, changed;  // overruns per step, before and while changes are compiled and swapped
+  double changes, seconds, step_max;
+} changing;
+
+// A patch that fits every plant and drops none of its modes: everything is compiled anew.
+static double change_once(const char *domain, int k) {
+  char patch[80];
+  snprintf(patch, sizeof patch, "{\"patch\": {\"max_frequency\": %.12g}}", 1e9 + k);
+  const char *argv[] = {PB_BIN "/plantbus-request",
+                        "--domain",
+                        domain,
+                        "--timeout",
+                        "20",
+                        "configure",
+                        patch,
+                        "--wait",
+                        NULL};
+  cJSON *json = bench_tool_json(argv, -1, 60);
+  if (!json) bench_fail("a change was refused");
+  const double seconds = bench_json_number(json, "compile_seconds");
+  cJSON_Delete(json);
+  return seconds;
+}
+
+static changing measure_changing(const bench_plant *plant, double rate, double seconds) {
+  const uint32_t number = bench_domain();
+  char domain[16];
+  changing c = {0};
+  snprintf(domain, sizeof domain, "%u", number);
+  bench_child daemon = daemon_start(plant, rate, number);
+  cJSON *begin = status_of(domain);
+  sleep((unsigned)ceil(seconds));
+  cJSON *middle = status_of(domain);
+  const double since = bench_now();
+  while (c.changes < 2 || bench_now() - since < seconds) {
+    const double took = change_once(domain, (int)c.changes++);
+    if (isfinite(took)) c.seconds = fmax(c.seconds, took);
+  }
+  cJSON *end = status_of(domain);
+  c.quiet = growth_of(begin, middle, "overruns") / growth_of(begin, middle, "step");
+  c.changed = growth_of(middle, end, "overruns") / growth_of(middle, end, "step");
+  c.step_max = bench_json_number(end, "jitter/max");
+  cJSON_Delete(begin);
+  cJSON_Delete(middle);
+  cJSON_Delete(end);
+  bench_child_end(&daemon, SIGTERM);
+  return c;
+}
+
+static const bench_column changing_columns[] = {
+    {"states", "states", NULL, 4},          {"rate", "rate", "Hz", 6},
+    {"quiet", "late steps, quiet", "‰", 2}, {"changed", "while changed", "‰", 2},
+    {"changes", "changes", NULL, 3},        {"compile", "longest compilation", "ms", 3},
+    {"jitter", "jitter max", "µs", 3},
+};
+
+static void measure_changes(bench *b, bench_table *t, const bench_plant *plant, double rate) {
+  char name[96];
+  const changing c = measure_changing(plant, rate, bench_quick(b) ? 1 : 4);
+  snprintf(name, sizeof name, "%zu states, %g kHz", plant->model->nx, rate / 1000);
+  bench_row(t, name,
+            (double[]){(double)plant->model->nx, rate, 1e3 * c.quiet, 1e3 * c.changed, c.changes,
+                       1e3 * c.seconds, 1e6 * c.step_max});
+}
+
+// ---- all of it ----------------------------------------------------------------------------------
 
 static const bench_column columns[] = {
     {"states", "states", NULL, 4},        {"rate", "rate", "Hz", 6},
@@ -186,6 +263,15 @@ int main(int argc, char **argv) {
       continue;
     }
     for (size_t r = 0; r < sizeof rates / sizeof *rates; r++) measure(b, t, plant, rates[r], &said);
+  }
+  bench_table *changes =
+      bench_table_add(b, "changing", "Late steps while the plant is changed", "case",
+                      sizeof changing_columns / sizeof *changing_columns, changing_columns);
+  for (size_t k = 0; k < sizeof sizes / sizeof *sizes; k++) {
+    const bench_plant *plant = bench_plants_find(&plants, sizes[k]);
+    if (!plant) continue;
+    measure_changes(b, changes, plant, 1000);
+    measure_changes(b, changes, plant, 10000);
   }
   bench_note(b, "Jitter is from a deadline to the begin of its step; the daemon's is of its "
                 "histogram, in bins of half an octave, from its start on.");

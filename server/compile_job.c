@@ -30,8 +30,8 @@ static pb_status compatible(const pb_model *before, const pb_model *next, pb_err
 
 static pb_status compile(pb_compile_job *job) {
   job->warnings.notes = &job->notes;
-  pb_status status = pb_revision_build(job->text, job->directory, job->number, &job->warnings,
-                                       &job->next, &job->err);
+  pb_status status = pb_revision_build(job->text, job->directory, job->number, job->store,
+                                       &job->warnings, &job->next, &job->err);
   if (!status) status = compatible(job->before->model, job->next->model, &job->err);
   if (status) return status;
   job->state = pb_state_new(job->next->model);

@@ -1,6 +1,7 @@
 // From a request to a changed plant: see configure.h. All by the service thread.
 #include "configure.h"
 
+#include <malloc.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -55,6 +56,7 @@ pb_status pb_configure_begin(pb_daemon *d, pb_request *request, const pb_configu
   p->job = (pb_compile_job){.text = order->text,
                             .directory = d->directory,
                             .before = pb_daemon_live(d),
+                            .store = &d->elements,
                             .number = d->revisions_made + 1,
                             .finished = compile_finished,
                             .context = d};
@@ -172,6 +174,14 @@ static char *model_result(const pb_daemon *d, const pb_pending *p) {
   return text;
 }
 
+// The health of the elements that were read for a change: whether it is made or refused, they are
+// not read, nor told of, again.
+static void elements_told(const pb_compile_job *job) {
+  for (size_t i = 0; i < job->notes.count; i++)
+    pb_log("plantbusd: revision %u: element %s: %s", job->number, job->notes.item[i].where,
+           job->notes.item[i].message);
+}
+
 static void model_told(pb_daemon *d) {
   pb_pending *p = &d->pending;
   const pb_history_entry *e = &d->history[(d->history_count - 1) % PB_CONFIGURE_HISTORY];
@@ -188,9 +198,7 @@ static void model_told(pb_daemon *d) {
   for (size_t i = 0; i < p->job.warnings.count; i++)
     pb_log("plantbusd: revision %u: warning: %s: %s", e->revision, p->job.warnings.item[i].where,
            p->job.warnings.item[i].message);
-  for (size_t i = 0; i < p->job.notes.count; i++)
-    pb_log("plantbusd: revision %u: element %s: %s", e->revision, p->job.notes.item[i].where,
-           p->job.notes.item[i].message);
+  elements_told(&p->job);
 }
 
 static void model_made(pb_daemon *d) {
@@ -211,6 +219,7 @@ static void model_made(pb_daemon *d) {
   p->job.next = NULL;  // it is the live one
   pending_clear(p);
   pb_revision_free(old);
+  malloc_trim(0);  // what was small in it is scattered over the heap
 }
 
 static void model_failed(pb_daemon *d, const pb_error *err) {
@@ -223,6 +232,7 @@ static void model_failed(pb_daemon *d, const pb_error *err) {
     pthread_mutex_unlock(&d->lock);
   }
   pb_log("plantbusd: a change of '%s' was refused: %s", d->pending.client_name, text);
+  elements_told(&d->pending.job);
   answer(d, "refused", err, "{}");
   pending_clear(&d->pending);
   d->status_due = true;

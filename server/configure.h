@@ -23,6 +23,7 @@ typedef struct pb_compile_job {
   char *text;                 // of the changed plant file
   const char *directory;      // of relative element paths
   const pb_revision *before;  // what runs; stays until the job is over
+  pb_element_store *store;    // of the elements read so far; the job's until it is over
   uint32_t number;            // of the revision to be made
   pb_revision *next;
   pb_state *state;

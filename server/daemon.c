@@ -38,7 +38,8 @@ static pb_status plant_load(pb_daemon *d, pb_warnings *warnings, pb_error *err) 
                           : pb_fail_memory(err, d->options.plant);
   if (!status && strlen(text) != length)
     status = pb_fail(err, PB_ERR_SYNTAX, d->options.plant, "holds a NUL");
-  if (!status) status = pb_revision_build(text, dirname(path), 1, warnings, &d->live, err);
+  if (!status)
+    status = pb_revision_build(text, dirname(path), 1, &d->elements, warnings, &d->live, err);
   free(text);
   free(path);
   if (!status) status = names_make(d, err);
@@ -116,6 +117,7 @@ bool pb_daemon_stop(pb_daemon *d) {
   pb_stepper_free(&d->stepper);
   if (!whole) return false;
   pb_revision_free(d->live);
+  pb_element_store_clear(&d->elements);
   free(d->name);
   free(d->directory);
   pthread_mutex_destroy(&d->lock);

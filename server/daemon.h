@@ -98,8 +98,9 @@ typedef struct pb_daemon {
   atomic_bool shutdown_asked;
 
   // of the service thread
-  pb_pending pending;   // but for what configure.h says is under lock
-  const pb_host *host;  // hosted items, as of the last change made
+  pb_element_store elements;  // read so far; the compile thread's while there is one
+  pb_pending pending;         // but for what configure.h says is under lock
+  const pb_host *host;        // hosted items, as of the last change made
   pb_history_entry history[PB_CONFIGURE_HISTORY];
   uint32_t history_count;
   uint32_t revisions_made;

@@ -1,5 +1,6 @@
 // plantbusd: serves one plant until SIGINT or SIGTERM.
 #include <fcntl.h>
+#include <malloc.h>
 #include <semaphore.h>
 #include <signal.h>
 #include <stdio.h>
@@ -16,6 +17,16 @@
 
 // Of OpenBLAS, when that is the BLAS in use.
 void openblas_set_num_threads(int count) __attribute__((weak));
+
+// Large arrays each have a mapping of their own, which goes back to the system when a revision is
+// freed. Left to itself the C library raises its threshold to the size of what was freed last and
+// keeps revisions' memory in its heap, ever more scattered.
+static void memory_returned(void) {
+#ifdef M_MMAP_THRESHOLD
+  mallopt(M_MMAP_THRESHOLD, 256 << 10);
+  mallopt(M_TRIM_THRESHOLD, 1 << 20);
+#endif
+}
 
 static void notify(const char *state) {
 #ifdef PB_HAVE_SYSTEMD
@@ -90,6 +101,7 @@ static void end_wait(void) {
 int main(int argc, char **argv) {
   // One BLAS thread: the order of its sums, and so every bit of the model, is the same in each run.
   if (openblas_set_num_threads) openblas_set_num_threads(1);
+  memory_returned();
   pb_daemon_options options;
   pb_options_parse(argc, argv, &options);
   streams_open();

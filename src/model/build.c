@@ -30,10 +30,10 @@ pb_model *pb_model_allocate(size_t nx, size_t nu, size_t ny, size_t modes, size_
   m->block_value = array(blocks + 1, sizeof(size_t));
   m->a = array(values, sizeof(double));
   m->ad = array(values, sizeof(double));
-  m->b = array(nx * nu, sizeof(double));
-  m->bd = array(nx * nu, sizeof(double));
-  m->c = array(ny * nx, sizeof(double));
-  m->d = array(ny * nu, sizeof(double));
+  m->b = pb_array_new(nx * nu, sizeof(double));
+  m->bd = pb_array_new(nx * nu, sizeof(double));
+  m->c = pb_array_new(ny * nx, sizeof(double));
+  m->d = calloc(ny * nu + 1, sizeof(double));  // with a motion map mostly zero and never touched
   if (m->input && m->output && m->mode_hz && m->mode_damping && m->block_start && m->block_value &&
       m->a && m->ad && m->b && m->bd && m->c && m->d)
     return m;
@@ -82,6 +82,7 @@ pb_status pb_model_builder_open(pb_model_builder *b, size_t nx, size_t nu, size_
                                 pb_error *err) {
   b->capacity = 2 * nx;
   b->plain = false;
+  b->direct = nu;
   b->model = pb_model_allocate(nx, nu, ny, modes, nx, b->capacity);  // at most nx blocks
   if (!b->model) return pb_fail_memory(err, "");
   b->model->blocks = 0;
@@ -132,11 +133,11 @@ static pb_model_part part_of(const pb_model *m, size_t block) {
                          .ldc = m->ny};
 }
 
-// D += −C A⁻¹ B of one block.
-static pb_status add_static(pb_model *m, const pb_model_part *p, pb_error *err) {
+// D += −C A⁻¹ B of one block, for the first `direct` inputs.
+static pb_status add_static(pb_model *m, const pb_model_part *p, size_t direct, pb_error *err) {
   size_t n = p->size;
-  int size = (int)n, nu = (int)m->nu, info = 0;
-  double *a = pb_array_new(n * n, sizeof *a), *x = pb_array_new(n * m->nu, sizeof *x);
+  int size = (int)n, nu = (int)direct, info = 0;
+  double *a = pb_array_new(n * n, sizeof *a), *x = pb_array_new(n * direct, sizeof *x);
   int *pivot = malloc(n * sizeof *pivot);
   pb_status st = PB_OK;
   if (!a || !x || !pivot) {
@@ -144,13 +145,13 @@ static pb_status add_static(pb_model *m, const pb_model_part *p, pb_error *err) 
     goto done;
   }
   memcpy(a, p->a, n * n * sizeof *a);
-  for (size_t i = 0; i < m->nu; i++) memcpy(x + i * n, p->b + i * p->ldb, n * sizeof *x);
+  for (size_t i = 0; i < direct; i++) memcpy(x + i * n, p->b + i * p->ldb, n * sizeof *x);
   dgesv_(&size, &nu, a, &size, pivot, x, &size, &info);
   if (info) {
     st = pb_fail(err, PB_ERR_NUMERIC, "/max_frequency", "a mode above it has no static response");
     goto done;
   }
-  for (size_t i = 0; i < m->nu; i++)
+  for (size_t i = 0; i < direct; i++)
     for (size_t o = 0; o < m->ny; o++)
       for (size_t j = 0; j < n; j++) m->d[o + i * m->ny] -= p->c[o + j * p->ldc] * x[j + i * n];
 done:
@@ -184,12 +185,12 @@ static int rank_order(const void *a, const void *b) {
   return (x->block > y->block) - (x->block < y->block);
 }
 
-static void copy_header(const pb_model *from, pb_model *to) {
+static void copy_header(const pb_model *from, size_t direct, pb_model *to) {
   to->sample_rate = from->sample_rate;
   to->dof = from->dof;
   memcpy(to->mode_hz, from->mode_hz, from->modes * sizeof(double));
   memcpy(to->mode_damping, from->mode_damping, from->modes * sizeof(double));
-  memcpy(to->d, from->d, from->ny * from->nu * sizeof(double));
+  memcpy(to->d, from->d, from->ny * direct * sizeof(double));
 }
 
 static pb_status copy_signals(const pb_model *from, pb_model *to, pb_error *err) {
@@ -241,8 +242,9 @@ static pb_status make_steps(pb_model *m, pb_error *err) {
   return st ? st : pb_step_pack_model(m, err);
 }
 
-// The blocks of m in order, those above hz (0: none) gone into d.
-static pb_status rebuild(const pb_model *m, double hz, bool steps, pb_model **out, pb_error *err) {
+// The blocks of m in order, those above hz (0: none) gone into the first columns of d.
+static pb_status rebuild(const pb_model *m, double hz, size_t direct, bool steps, pb_model **out,
+                         pb_error *err) {
   double limit = hz > 0 ? two_pi * hz : INFINITY;
   size_t kept = 0, nx = 0, values = 0;
   rank *order = malloc((m->blocks + 1) * sizeof *order);
@@ -257,14 +259,14 @@ static pb_status rebuild(const pb_model *m, double hz, bool steps, pb_model **ou
   pb_model *copy = pb_model_allocate(nx, m->nu, m->ny, m->modes, kept, values);
   pb_status st = copy ? copy_signals(m, copy, err) : pb_fail_memory(err, "");
   if (!st) {
-    copy_header(m, copy);
+    copy_header(m, direct, copy);
     copy->max_frequency = hz;
     copy->blocks = 0;
   }
   for (size_t k = 0; k < m->blocks && !st; k++) {
     pb_model_part p = part_of(m, order[k].block);
     if (order[k].fast)
-      st = add_static(copy, &p, err);
+      st = add_static(copy, &p, direct, err);
     else
       append(copy, &p);
   }
@@ -305,7 +307,7 @@ pb_status pb_model_narrow(const pb_model *m, size_t nu, size_t ny, pb_model **ou
 
 pb_status pb_model_builder_close(pb_model_builder *b, double max_frequency, pb_model **out,
                                  pb_error *err) {
-  pb_status st = rebuild(b->model, max_frequency, !b->plain, out, err);
+  pb_status st = rebuild(b->model, max_frequency, b->direct, !b->plain, out, err);
   pb_model_builder_discard(b);
   return st;
 }
@@ -313,7 +315,7 @@ pb_status pb_model_builder_close(pb_model_builder *b, double max_frequency, pb_m
 pb_status pb_model_truncate(const pb_model *model, double hz, pb_model **out, pb_error *err) {
   *out = NULL;
   if (!(hz > 0)) return pb_fail(err, PB_ERR_ARGUMENT, "max_frequency", "expected a number > 0");
-  return rebuild(model, hz, true, out, err);
+  return rebuild(model, hz, model->nu, true, out, err);
 }
 
 pb_status pb_model_discretize(pb_model *m, pb_error *err) {

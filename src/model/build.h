@@ -8,6 +8,7 @@ typedef struct pb_model_builder {
   pb_model *model;  // blocks in the order in which they came, not discretised
   size_t capacity;  // of model->a
   bool plain;       // the model is to be narrowed, not to be stepped: not discretised
+  size_t direct;    // leading inputs whose column of d is wanted; all unless the caller says less
 } pb_model_builder;
 
 // One diagonal block: a size × size (leading dimension lda), b size × nu (ldb), c ny × size (ldc).
@@ -17,7 +18,7 @@ typedef struct pb_model_part {
   size_t lda, ldb, ldc;
 } pb_model_part;
 
-// A zeroed model of these sizes, blocks to come; the caller fills name, signals, rates, modes and
+// A model of these sizes, blocks to come; the caller fills name, signals, rates, modes and
 // d.
 pb_status pb_model_builder_open(pb_model_builder *builder, size_t nx, size_t nu, size_t ny,
                                 size_t modes, pb_error *err);
@@ -37,8 +38,8 @@ pb_status pb_model_copy_header(const pb_model *from, pb_model *to, pb_error *err
 // Frees what an unfinished builder holds.
 void pb_model_builder_discard(pb_model_builder *builder);
 
-// Allocates a model and all its arrays for these sizes; a, ad have `values` entries. NULL on
-// failure.
+// Allocates a model and all its arrays for these sizes; a, ad have `values` entries. b, bd and c
+// are not zeroed: the blocks fill them, and with a motion map they are large. NULL on failure.
 pb_model *pb_model_allocate(size_t nx, size_t nu, size_t ny, size_t modes, size_t blocks,
                             size_t values);
 

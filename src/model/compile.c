@@ -146,6 +146,7 @@ pb_status pb_model_compile_observed(const pb_system *s, const pb_observer *obser
   pb_phase_begin(observer, PB_PHASE_DAMP);
   if (!st) st = pb_model_builder_open(&builder, 2 * s->n, nu, ny, s->n, err);
   builder.plain = s->stacked > 0;
+  builder.direct = s->nu;
   if (!st) st = fill_header(s, &modes, builder.model, err);
   if (!st) st = build_groups(&modes, &builder, err);
   pb_modes_clear(&modes);

@@ -36,12 +36,19 @@ static void shapes_clear(shapes *s) {
   free(s->product);
 }
 
+// The plant's own outputs add up, order by order; what follows stacked coordinates is set.
+static void outputs_zero(shapes *s) {
+  for (int i = 0; i < 2; i++)
+    for (size_t k = 0; k < s->d.columns; k++)
+      memset(s->c[i] + k * s->ny, 0, s->m->ny * sizeof(double));
+}
+
 static pb_status shapes_new(shapes *s, pb_error *err) {
   const size_t n = s->d.n, columns = s->d.columns, nu = s->nu, ny = s->ny;
   bool ok = true;
   for (int i = 0; i < 2; i++) {
     s->b[i] = pb_array_new(columns * nu + 1, sizeof(double));
-    s->c[i] = pb_array_zero(ny * columns + 1, sizeof(double));
+    s->c[i] = pb_array_new(ny * columns + 1, sizeof(double));
     s->w[i] = s->m->stacked ? pb_array_new(n * columns, sizeof(double)) : NULL;
     ok = ok && s->b[i] && s->c[i] && (s->w[i] || !s->m->stacked);
   }
@@ -49,7 +56,9 @@ static pb_status shapes_new(shapes *s, pb_error *err) {
   s->gather = pb_array_new(n * more + 1, sizeof(double));
   s->product = pb_array_new(s->m->ny * columns + 1, sizeof(double));
   ok = ok && s->gather && s->product;
-  return ok ? PB_OK : pb_fail_memory(err, "");
+  if (!ok) return pb_fail_memory(err, "");
+  outputs_zero(s);
+  return PB_OK;
 }
 
 static size_t mode_of(const shapes *s, size_t row) {

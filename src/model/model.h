@@ -81,7 +81,7 @@ pb_status pb_model_load(const char *path, pb_warnings *warnings, pb_model **out,
 // The same with an observer (may be NULL) told as each phase begins. A system that tells how
 // stacked coordinates follow (system.h) gets each of them as two more outputs (all q_i, then all
 // q̇_i) and two more inputs (a displacement of each in the metric of M: f = M q sets η = Φᵀf at
-// once; then an impulse on each), after the plant's own. [init]
+// once; then an impulse on each), after the plant's own; their columns of D stay zero. [init]
 pb_status pb_model_compile_observed(const struct pb_system *system, const pb_observer *observer,
                                     pb_warnings *warnings, pb_model **out, pb_error *err);
 pb_status pb_model_load_observed(const char *path, const pb_observer *observer,

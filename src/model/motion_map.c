@@ -46,18 +46,19 @@ static pb_status map_fill(const pb_model *x, pb_motion_map *map, pb_error *err) 
   return pb_fail_memory(err, "motion map");
 }
 
-static pb_status extended_compile(pb_plant *plant, pb_warnings *warnings, pb_model **out,
-                                  pb_motion_map *map, pb_error *err) {
+static pb_status extended_compile(pb_plant *plant, const pb_observer *observer,
+                                  pb_warnings *warnings, pb_model **out, pb_motion_map *map,
+                                  pb_error *err) {
   pb_system *system = NULL;
   pb_model *extended = NULL;
   pb_system_stack stack = {0};
-  pb_status st = pb_system_assemble_observed(plant, NULL, warnings, &system, &stack, err);
+  pb_status st = pb_system_assemble_observed(plant, observer, warnings, &system, &stack, err);
   map->layout = stack.layout;
   map->n = stack.layout.size;
   map->m = stack.m;
   map->k = stack.k;
   map->f = stack.f;
-  if (!st) st = pb_model_compile(system, warnings, &extended, err);
+  if (!st) st = pb_model_compile_observed(system, observer, warnings, &extended, err);
   pb_system_free(system);
   if (!st) st = map_fill(extended, map, err);
   if (!st) st = pb_model_narrow(extended, plant->input_count, plant->output_count, out, err);
@@ -85,18 +86,27 @@ static pb_status size_of(const pb_plant *plant, size_t *size, pb_error *err) {
 pb_status pb_model_parse(const char *text, size_t length, const char *directory,
                          pb_warnings *warnings, pb_model **out, pb_motion_map **map,
                          char **canonical, pb_error *err) {
+  return pb_model_parse_stored(text, length, directory, NULL, NULL, warnings, out, map, canonical,
+                               err);
+}
+
+pb_status pb_model_parse_stored(const char *text, size_t length, const char *directory,
+                                pb_element_store *store, const pb_observer *observer,
+                                pb_warnings *warnings, pb_model **out, pb_motion_map **map,
+                                char **canonical, pb_error *err) {
   pb_motion_map *made = calloc(1, sizeof *made);
   pb_plant *plant = NULL;
   size_t size = 0;
   *out = NULL;
   *map = NULL;
   if (canonical) *canonical = NULL;
-  pb_status st = made ? pb_plant_parse(text, length, directory, warnings, &plant, err)
+  pb_phase_begin(observer, PB_PHASE_READ);
+  pb_status st = made ? pb_plant_parse_stored(text, length, directory, store, warnings, &plant, err)
                       : pb_fail_memory(err, "motion map");
   if (!st) made->plant = plant;
   if (!st) st = size_of(plant, &size, err);
   const bool mapped = size <= PB_MOTION_MAP_LARGEST;
-  if (!st && mapped) st = extended_compile(plant, warnings, out, made, err);
+  if (!st && mapped) st = extended_compile(plant, observer, warnings, out, made, err);
   if (!st && !mapped) st = plain_compile(plant, warnings, out, err);
   if (!st && canonical) {
     *canonical = pb_text_copy(plant->text);

@@ -36,6 +36,13 @@ pb_status pb_model_parse(const char *text, size_t length, const char *directory,
                          pb_warnings *warnings, pb_model **out, pb_motion_map **map,
                          char **canonical, pb_error *err);
 
+// The same with the elements of a store (element_store.h; NULL: none) and an observer (NULL: none)
+// told as each phase begins. [init]
+pb_status pb_model_parse_stored(const char *text, size_t length, const char *directory,
+                                pb_element_store *store, const pb_observer *observer,
+                                pb_warnings *warnings, pb_model **out, pb_motion_map **map,
+                                char **canonical, pb_error *err);
+
 void pb_motion_map_free(pb_motion_map *map);  // NULL is allowed
 
 // Kinetic and strain energy of a state with inputs u [nu], J. Fails with PB_ERR_MEMORY. [init]

@@ -16,28 +16,63 @@ static void multiply(size_t m, size_t n, size_t k, double alpha, const double *a
   if (m && n) dgemm_("N", "N", &im, &in, &ik, &alpha, a, &im, b, &ik, &beta, c, &im);
 }
 
+// Rows of a matrix, first ≤ r < end.
+typedef struct range {
+  size_t first, end;
+} range;
+
+static range nonzeros(const double *column, size_t rows) {
+  range r = {0, rows};
+  while (r.end > 0 && column[r.end - 1] == 0.0) r.end--;
+  while (r.first < r.end && column[r.first] == 0.0) r.first++;
+  return r;
+}
+
+// c = a s where s (k × n) is nearly block diagonal, as what belongs to components is: columns whose
+// entries share rows with those before are a block, a product of its own.
+static void multiply_blocks(size_t m, size_t n, size_t k, const double *a, const double *s,
+                            double *c) {
+  for (size_t j = 0, next; j < n; j = next) {
+    range block = nonzeros(s + j * k, k);
+    for (next = j + 1; next < n; next++) {
+      const range r = nonzeros(s + next * k, k);
+      if (r.first >= block.end || r.end <= block.first) break;
+      if (r.first < block.first) block.first = r.first;
+      if (r.end > block.end) block.end = r.end;
+    }
+    const int im = (int)m, in = (int)(next - j), ik = (int)(block.end - block.first), ld = (int)k;
+    const double one = 1.0, zero = 0.0;
+    if (ik)
+      dgemm_("N", "N", &im, &in, &ik, &one, a + block.first * m, &im, s + block.first + j * k, &ld,
+             &zero, c + j * m, &im);
+    else
+      memset(c + j * m, 0, m * (next - j) * sizeof *c);
+  }
+}
+
 // Work space of the preparation; nq old, nr new coordinates.
 typedef struct work {
   double *lu;       // nr × nu'
   double *l;        // nr × nq
-  double *bm;       // nx' × nr: B M'
-  double *bml;      // nx' × nq
+  double *ml;       // nr × nq: M' L
+  double *bml;      // nx' × nq: B M' L
   double *static_;  // nr × nu: D_q' after the old inputs' names
+  double *force;    // nr × nu: M' of it
 } work;
 
 static void work_clear(work *w) {
   free(w->l);
   free(w->lu);
-  free(w->bm);
+  free(w->ml);
   free(w->bml);
   free(w->static_);
+  free(w->force);
 }
 
-// X += (B M' L) C, leaving B M' and B M' L in the work space.
+// X += (B M' L) C, leaving B M' L in the work space.
 static void add_part(const pb_transfer *t, work *w, const double *b, const double *c) {
   const pb_motion_map *from = t->from_map, *to = t->to_map;
-  multiply(to->nx, to->n, to->n, 1.0, b, to->m, 0.0, w->bm);
-  multiply(to->nx, from->n, to->n, 1.0, w->bm, w->l, 0.0, w->bml);
+  multiply_blocks(to->nx, from->n, to->n, b, w->ml, w->bml);
   multiply(to->nx, from->nx, from->n, 1.0, w->bml, c, 1.0, t->x);
 }
 
@@ -52,18 +87,21 @@ static void add_static(const pb_transfer *t, work *w) {
       w->static_[r + (size_t)t->input_from[i] * to->n] =
           to->dq[r + i * to->n] - w->lu[r + i * to->n];
   }
-  multiply(to->nx, from->nu, to->n, -1.0, w->bm, w->static_, 1.0, t->u);
+  multiply(to->n, from->nu, to->n, 1.0, to->m, w->static_, 0.0, w->force);
+  multiply(to->nx, from->nu, to->n, -1.0, to->bq, w->force, 1.0, t->u);
 }
 
 static pb_status matrices_make(pb_transfer *t, pb_error *err) {
   const pb_motion_map *from = t->from_map, *to = t->to_map;
   work w = {0};
   pb_status st = pb_transfer_coordinates(from, to, &w.l, &w.lu, err);
-  w.bm = pb_array_new(to->nx * to->n, sizeof(double));
+  w.ml = pb_array_new(to->n * from->n, sizeof(double));
   w.bml = pb_array_new(to->nx * from->n, sizeof(double));
   w.static_ = pb_array_zero(to->n * from->nu + 1, sizeof(double));
-  if (!st && (!w.bm || !w.bml || !w.static_)) st = pb_fail_memory(err, "transfer");
+  w.force = pb_array_new(to->n * from->nu + 1, sizeof(double));
+  if (!st && (!w.ml || !w.bml || !w.static_ || !w.force)) st = pb_fail_memory(err, "transfer");
   if (!st) {
+    multiply_blocks(to->n, from->n, to->n, to->m, w.l, w.ml);
     add_part(t, &w, to->bv, from->cv);
     add_part(t, &w, to->bq, from->cq);
     add_static(t, &w);  // with what the displacements have left

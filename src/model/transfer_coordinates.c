@@ -68,6 +68,7 @@ static void add_row(const carrier *c, size_t coordinate, double factor, const do
 // --- the same component ---
 
 static bool same_element(const pb_super_element *a, const pb_super_element *b) {
+  if (a->element == b->element) return true;
   return a->element->size == b->element->size && a->element->frames == b->element->frames &&
          strcmp(a->element->file, b->element->file) == 0;
 }

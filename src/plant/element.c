@@ -110,7 +110,7 @@ done:
   return st;
 }
 
-static pb_status warn_health(const pb_element *e, pb_warnings *warnings, pb_error *err) {
+pb_status pb_element_warn(const pb_element *e, pb_warnings *warnings, pb_error *err) {
   const pb_element_health *h = &e->health;
   pb_status st = PB_OK;
   double worst = fmax(h->asymmetry_k, h->asymmetry_m);
@@ -162,7 +162,9 @@ pb_status pb_element_new(const char *name, size_t frames, size_t size, const dou
   if (st) return st;
   pb_element *e = calloc(1, sizeof *e);
   if (!e) return pb_fail_memory(err, name);
-  *e = (pb_element){.users = 1, .frames = frames, .size = size};
+  atomic_init(&e->users, 1);
+  e->frames = frames;
+  e->size = size;
   if (allocate(e, name)) {
     st = pb_fail_memory(err, name);
     goto done;
@@ -181,7 +183,7 @@ pb_status pb_element_new(const char *name, size_t frames, size_t size, const dou
   symmetrize(e->m, size);
   measure_mass(e);
   st = solve_free(e, err);
-  if (!st) st = warn_health(e, warnings, err);
+  if (!st) st = pb_element_warn(e, warnings, err);
 done:
   if (st) {
     pb_element_free(e);
@@ -192,12 +194,16 @@ done:
 }
 
 pb_element *pb_element_share(pb_element *element) {
-  element->users++;
+  atomic_fetch_add(&element->users, 1);
   return element;
 }
 
+size_t pb_element_users(const pb_element *e) {
+  return atomic_load(&e->users);
+}
+
 void pb_element_free(pb_element *e) {
-  if (!e || --e->users) return;
+  if (!e || atomic_fetch_sub(&e->users, 1) > 1) return;
   free(e->file);
   free(e->position);
   free(e->k);

@@ -6,6 +6,7 @@
 #ifndef PB_PLANT_ELEMENT_H
 #define PB_PLANT_ELEMENT_H
 
+#include <stdatomic.h>
 #include <stddef.h>
 
 #include "base/status.h"
@@ -20,8 +21,10 @@ typedef struct pb_element_health {
   double flexible_hz;               // the next one: first free mode that deforms the part
 } pb_element_health;
 
+// Never changes once made, apart from the count of its users: threads may share it, each taking and
+// giving back uses of its own.
 typedef struct pb_element {
-  size_t users;      // reference count
+  atomic_size_t users;
   char *file;        // path as resolved
   size_t frames;     // n
   size_t size;       // m = 6n + p
@@ -56,8 +59,12 @@ pb_status pb_element_new(const char *name, size_t frames, size_t size, const dou
                          const double *k, const double *m, pb_warnings *warnings, pb_element **out,
                          pb_error *err);
 
-pb_element *pb_element_share(pb_element *element);  // one more user
-void pb_element_free(pb_element *element);          // one user less; NULL is allowed
+pb_element *pb_element_share(pb_element *element);   // one more user [any]
+size_t pb_element_users(const pb_element *element);  // [any]
+void pb_element_free(pb_element *element);           // one user less; NULL is allowed
+
+// The warnings of pb_element_load again, of an element that was read before. PB_ERR_MEMORY. [init]
+pb_status pb_element_warn(const pb_element *element, pb_warnings *warnings, pb_error *err);
 
 // C of modal damping: C = MΦ diag(2ξω) ΦᵀM, eigenvalues below zero counted as zero; added to
 // c (size × size). [init]

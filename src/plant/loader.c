@@ -28,6 +28,26 @@ static pb_status note_health(pb_loader *loader, const pb_element *e) {
   return pb_warn(loader->warnings->notes, loader->err, e->file, "%s", text);
 }
 
+// From the store of those read for earlier plants, or else from its file.
+static pb_status read_element(pb_loader *loader, const char *path, const char *where,
+                              pb_element **out) {
+  pb_element_file file;
+  pb_error inner = {0};
+  pb_element *e = pb_element_store_find(loader->store, path, &file);
+  const bool kept = e != NULL;
+  pb_status st = kept ? pb_element_warn(e, loader->warnings, &inner)
+                      : pb_element_load(path, loader->warnings, &e, &inner);
+  if (st) pb_fail(loader->err, st, where, "%.200s: %.280s", inner.where, inner.message);
+  if (!st && !kept) st = note_health(loader, e);
+  if (!st && !kept) pb_element_store_keep(loader->store, e, &file);
+  if (!st) st = keep_element(loader, e);
+  if (st)
+    pb_element_free(e);
+  else
+    *out = pb_element_share(e);
+  return st;
+}
+
 pb_status pb_loader_element(pb_loader *loader, const pb_reader *r, pb_element **out) {
   const char *file;
   char where[256];
@@ -41,18 +61,7 @@ pb_status pb_loader_element(pb_loader *loader, const pb_reader *r, pb_element **
   if (path.failed) return pb_fail_memory(loader->err, where);
   for (size_t i = 0; i < loader->element_count && !*out; i++)
     if (!strcmp(loader->element[i]->file, path.text)) *out = pb_element_share(loader->element[i]);
-  if (!*out) {
-    pb_element *e = NULL;
-    pb_error inner = {0};
-    st = pb_element_load(path.text, loader->warnings, &e, &inner);
-    if (st) {
-      pb_fail(loader->err, st, where, "%.200s: %.280s", inner.where, inner.message);
-    } else if ((st = note_health(loader, e)) || (st = keep_element(loader, e))) {
-      pb_element_free(e);
-    } else {
-      *out = pb_element_share(e);
-    }
-  }
+  if (!*out) st = read_element(loader, path.text, where, out);
   free(path.text);
   return st;
 }

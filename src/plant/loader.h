@@ -12,6 +12,7 @@ typedef struct pb_loader {
   const char *directory;  // of relative element paths
   pb_warnings *warnings;
   pb_error *err;
+  pb_element_store *store;  // of earlier plants' elements; may be NULL
   size_t element_count;
   pb_element **element;  // one user each; files are read once
 } pb_loader;

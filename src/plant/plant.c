@@ -187,11 +187,12 @@ static pb_status read_plant(pb_loader *loader, const cJSON *file, cJSON **expand
   return st ? st : write_text(file, loader->directory, p, err);
 }
 
-pb_status pb_plant_parse(const char *text, size_t length, const char *directory,
-                         pb_warnings *warnings, pb_plant **out, pb_error *err) {
+pb_status pb_plant_parse_stored(const char *text, size_t length, const char *directory,
+                                pb_element_store *store, pb_warnings *warnings, pb_plant **out,
+                                pb_error *err) {
   *out = NULL;
   cJSON *file = NULL, *expanded = NULL;
-  pb_loader loader = {.directory = directory, .warnings = warnings, .err = err};
+  pb_loader loader = {.directory = directory, .warnings = warnings, .err = err, .store = store};
   pb_status st = pb_json_parse(text, length, &file, err);
   if (st) return st;
   pb_plant *p = calloc(1, sizeof *p);
@@ -206,6 +207,11 @@ pb_status pb_plant_parse(const char *text, size_t length, const char *directory,
     *out = p;
   }
   return st;
+}
+
+pb_status pb_plant_parse(const char *text, size_t length, const char *directory,
+                         pb_warnings *warnings, pb_plant **out, pb_error *err) {
+  return pb_plant_parse_stored(text, length, directory, NULL, warnings, out, err);
 }
 
 pb_status pb_plant_load(const char *path, pb_warnings *warnings, pb_plant **out, pb_error *err) {

@@ -10,6 +10,7 @@
 #include "base/status.h"
 #include "model/electronics.h"
 #include "plant/element.h"
+#include "plant/element_store.h"
 
 #define PB_MAX_INPUTS 32  // of the bus's Sample and Command types
 #define PB_MAX_OUTPUTS 64
@@ -180,6 +181,12 @@ pb_status pb_plant_load(const char *path, pb_warnings *warnings, pb_plant **out,
 // [init]
 pb_status pb_plant_parse(const char *text, size_t length, const char *directory,
                          pb_warnings *warnings, pb_plant **out, pb_error *err);
+
+// The same with elements that `store` (NULL: none) kept of plants read before; those read now are
+// kept in it. Their warnings are given again, notes on their health only as they are read. [init]
+pb_status pb_plant_parse_stored(const char *text, size_t length, const char *directory,
+                                pb_element_store *store, pb_warnings *warnings, pb_plant **out,
+                                pb_error *err);
 
 void pb_plant_free(pb_plant *plant);
 

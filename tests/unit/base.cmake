@@ -1,6 +1,7 @@
 pb_test(unit_json LABELS unit SOURCES test_json.c)
 pb_test(unit_plant LABELS unit SOURCES test_plant.c)
 pb_test(unit_element LABELS unit SOURCES test_element.c ../support/beam.c LIBS PkgConfig::MATIO)
+pb_test(unit_element_store LABELS unit SOURCES test_element_store.c ../support/beam.c LIBS PkgConfig::MATIO)
 pb_test(unit_assembly LABELS unit SOURCES test_assembly.c ../support/beam.c LIBS PkgConfig::MATIO)
 pb_test(unit_damped LABELS unit SOURCES test_damped.c)
 pb_test(unit_model LABELS unit SOURCES test_model.c)
