@@ -51,6 +51,13 @@ pb_status pb_outfile_create(const char *path, pb_outfile *out, pb_error *err) {
   return PB_OK;
 }
 
+pb_status pb_outfile_probe(const char *path, pb_error *err) {
+  pb_outfile file;
+  pb_status status = path ? pb_outfile_create(path, &file, err) : PB_OK;
+  if (path && !status) pb_outfile_discard(&file);
+  return status;
+}
+
 pb_status pb_outfile_commit(pb_outfile *out, pb_error *err) {
   pb_status status = PB_OK;
   if (!out->direct && rename(out->temp, out->path)) {

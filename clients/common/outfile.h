@@ -18,6 +18,10 @@ typedef struct pb_outfile {
 // Creates the temporary file next to path. Fails with PB_ERR_IO (path, reason), PB_ERR_MEMORY.
 pb_status pb_outfile_create(const char *path, pb_outfile *out, pb_error *err);
 
+// Whether path can be created, before long work whose result it is to hold; NULL is a path that
+// nobody asked for. Leaves nothing behind. Fails like pb_outfile_create.
+pb_status pb_outfile_probe(const char *path, pb_error *err);
+
 // Gives the file its name. Call with all streams on it closed. Fails with PB_ERR_IO; the temporary
 // file is then gone. *out is emptied either way.
 pb_status pb_outfile_commit(pb_outfile *out, pb_error *err);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/text.h"
+#include "outfile.h"
 #include "part.h"
 
 enum {
@@ -158,7 +159,9 @@ static error_t parse(int key, char *arg, struct argp_state *state) {
 static pb_status build_one(const build_options *o, pb_error *err) {
   cJSON *json = NULL;
   build b = {0};
-  pb_status st = build_read(o, &json, err);
+  pb_status st = pb_outfile_probe(o->out, err);
+  if (!st) st = pb_outfile_probe(o->picture, err);
+  if (!st) st = build_read(o, &json, err);
   if (!st) st = build_model(json, &b, err);
   if (!st) st = build_reduce(&b, o->picture_mode > 0, err);
   if (!st && o->out) st = build_write(&b, o, err);
@@ -175,9 +178,11 @@ int part_build(int argc, char **argv) {
   build_options options = {0};
   pb_error err = {0};
   pb_options_parse(&argp, argc, argv, &options);
-  pb_status st = options.sweep       ? build_sweep(&options, &err)
-                 : options.densities ? build_converge(&options, &err)
-                                     : build_one(&options, &err);
+  pb_status st = pb_outfile_probe(options.plot, &err);
+  if (!st)
+    st = options.sweep       ? build_sweep(&options, &err)
+         : options.densities ? build_converge(&options, &err)
+                             : build_one(&options, &err);
   if (st) pb_print_error(stderr, &err);
   for (size_t i = 0; i < options.sets; i++) free((char *)options.set[i]);
   free(options.set);

@@ -6,6 +6,7 @@
 #include "base/text.h"
 #include "blas_threads.h"
 #include "options.h"
+#include "outfile.h"
 #include "part.h"
 #include "progress.h"
 #include "reduce.h"
@@ -199,6 +200,7 @@ static pb_status reduce_element(const reduce_options *o, reduce_run *run, pb_err
   watch w = {.run = run};
   pb_progress_begin(&w.line, stderr, run->fem.name);
   pb_reduce_options options = o->reduce;
+  options.spend = &run->fem.k;
   options.progress = follow;
   options.context = &w;
   pb_status st = pb_reduce(&run->fem, &options, false, &run->element, err);
@@ -263,7 +265,8 @@ int part_reduce(int argc, char **argv) {
   const struct argp argp = {option_table, parse, "STIFFNESS MASS", description, NULL, NULL, NULL};
   pb_options_parse(&argp, argc, argv, &options);
   double begun = now();
-  pb_status st = reduce_read(&options, &run, &err);
+  pb_status st = pb_outfile_probe(options.out, &err);
+  if (!st) st = reduce_read(&options, &run, &err);
   reduce_measure(&run.read);
   run.read.seconds = now() - begun;
   if (!st) st = reduce_element(&options, &run, &err);

@@ -68,6 +68,7 @@ static void clear_work(reduce_work *w) {
   free(w->scale);
   free(w->pivot);
   free(w->psi);
+  free(w->stiffness);
   free(w->phi);
   free(w->omega2);
 }
@@ -99,6 +100,12 @@ static pb_status keep_shape(reduce_work *w, pb_error *err) {
   return PB_OK;
 }
 
+// The modes take the most memory of all phases; K makes room for them.
+static void spend_stiffness(const reduce_work *w) {
+  const pb_reduce_options *o = w->options;
+  if (o->spend && !o->prove && !(o->max_hz > 0) && !o->check_points) pb_sparse_clear(o->spend);
+}
+
 pb_status pb_reduce(const pb_fem *fem, const pb_reduce_options *options, bool keep_shapes,
                     pb_reduction **out, pb_error *err) {
   *out = NULL;
@@ -110,6 +117,8 @@ pb_status pb_reduce(const pb_fem *fem, const pb_reduce_options *options, bool ke
   st = reduce_set_up(&w, err);
   if (!st) st = prepare_result(&w, err);
   if (!st) st = reduce_static(&w, err);
+  if (!st) st = reduce_project_stiffness(&w, err);
+  if (!st) spend_stiffness(&w);
   if (!st) st = reduce_modes(&w, err);
   if (!st) st = reduce_project(&w, err);
   if (!st && keep_shapes) st = keep_shape(&w, err);

@@ -31,6 +31,7 @@ typedef struct pb_reduce_options {
   bool prove;  // prove by a count that no mode is missing where they are asked for by number, too
   size_t check_points;  // frequencies at which the element is compared with the full model; 0: none
   double check_to_hz;   // highest of them; 0: half the last kept mode's frequency
+  pb_sparse *spend;     // NULL, or the K of fem: freed (left empty) as soon as no phase needs it
   // Called when a phase starts (done = 0) and as it goes; total ≤ 0: unknown. Returning false stops
   // the reduction with PB_ERR_STATE. May be NULL.
   bool (*progress)(void *context, pb_reduce_phase phase, double done, double total);

@@ -43,9 +43,10 @@ typedef struct reduce_work {
   double *d, *scale;
   int *pivot;
   // Results
-  double *psi;     // full × boundary: constraint modes, with the rigid frames' own motion
-  double *phi;     // full × modes
-  double *omega2;  // [modes]
+  double *psi;        // full × boundary: constraint modes, with the rigid frames' own motion
+  double *stiffness;  // boundary × boundary: ΨᵀKΨ
+  double *phi;        // full × modes
+  double *omega2;     // [modes]
   size_t modes;
   double next_omega2;  // estimate of the first mode that is not kept; ∞: there is none
   pb_reduction *out;
@@ -80,7 +81,9 @@ pb_status reduce_respond(reduce_work *w, size_t columns, double *u, pb_error *er
 // reduce_modes.c
 pb_status reduce_modes(reduce_work *w, pb_error *err);
 
-// reduce_project.c: K and M of the element, masses, residual of rigid motions.
+// reduce_project.c: ΨᵀKΨ, after which only a proof and a check need the full K; then K and M of the
+// element, masses, residual of rigid motions.
+pb_status reduce_project_stiffness(reduce_work *w, pb_error *err);
 pb_status reduce_project(reduce_work *w, pb_error *err);
 
 // reduce_check.c: the count of modes, and the comparison with the full model.

@@ -94,12 +94,25 @@ static void choose_signs(reduce_work *w) {
   }
 }
 
-// Six columns of Ψ at a time: their products with K and M against all that comes up to them.
+pb_status reduce_project_stiffness(reduce_work *w, pb_error *err) {
+  size_t b = w->boundary;
+  double *product = malloc(6 * w->full * sizeof *product);
+  w->stiffness = malloc(b * b * sizeof *w->stiffness);
+  pb_status st = product && w->stiffness ? PB_OK : pb_fail_memory(err, w->fem->name);
+  for (size_t c = 0; !st && c < b; c += 6) {
+    pb_sparse_multiply(&w->fem->k, 6, w->psi + c * w->full, product);
+    gemm_t(b, 6, w->full, w->psi, product, w->stiffness + c * b, b);
+  }
+  free(product);
+  return st;
+}
+
+// Six columns of Ψ at a time: their products with M against all that comes up to them.
 static void project_columns(reduce_work *w, size_t c, double *product) {
   size_t m = w->out->size, b = w->boundary;
   const double *psi = w->psi + c * w->full;
-  pb_sparse_multiply(&w->fem->k, 6, psi, product);
-  gemm_t(b, 6, w->full, w->psi, product, w->out->k + c * m, m);
+  for (size_t j = c; j < c + 6; j++)
+    memcpy(w->out->k + j * m, w->stiffness + j * b, b * sizeof *w->stiffness);
   reduce_mass_multiply(w, 6, psi, product);
   gemm_t(b, 6, w->full, w->psi, product, w->out->m + c * m, m);
   gemm_t(w->modes, 6, w->full, w->phi, product, w->out->m + b + c * m, m);

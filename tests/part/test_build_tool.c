@@ -122,8 +122,14 @@ static void test_messages(void **state) {
   part_complains("leaves through the side");
   assert_int_equal(part_run("build nothing.json"), 1);
   part_complains("nothing.json");
-  assert_int_equal(part_run("build " JOINT " --mesh 0.5 -o no/such/place.mat"), 1);
-  part_complains("no/such/place.mat");
+  // A place that cannot be written is told before the work, even of a part that cannot be meshed.
+  static const char *const hopeless[] = {"-o no/such/place.mat", "--picture no/such/place.svg"};
+  for (size_t i = 0; i < 2; i++) {
+    char line[512];
+    snprintf(line, sizeof line, "build " JOINT " --set /dimensions/height=1 %s", hopeless[i]);
+    assert_int_equal(part_run(line), 1);
+    part_complains("no/such/place");
+  }
   assert_int_equal(part_run("build " JOINT " --mesh 0.5 --picture a.svg --picture-mode 900"), 1);
   part_complains("modes");
 }
