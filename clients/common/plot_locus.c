@@ -36,6 +36,8 @@ static frame choose_frame(const pb_locus_plot *plot) {
   enclose(&f, plot->measured, plot->measured_count, false, true);
   enclose(&f, plot->branch, plot->branches * plot->gains, false, false);
   if (f.left < -1.2 * f.top) f.left = -1.2 * f.top;
+  // A real zero far out on the right (of a channel whose zero lies at infinity but for rounding).
+  if (f.right > 1.2 * f.top) f.right = 1.2 * f.top;
   if (plot->min_real < 0) f.left = plot->min_real;
   if (f.left == 0) f.left = -0.1 * f.top;
   f.left *= 1.06;
