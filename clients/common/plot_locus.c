@@ -21,7 +21,8 @@ static void enclose(frame *f, const double complex *point, size_t count, bool gr
     if (grow_top && im > f->top) f->top = im;
     if (im > 1.1 * f->top) continue;
     if (re < f->left) f->left = re;
-    if (re > f->right) f->right = re;
+    // Not a real zero far out on the right: it may be one at infinity but for rounding.
+    if (re > f->right && re <= f->top) f->right = re;
   }
 }
 
@@ -36,8 +37,6 @@ static frame choose_frame(const pb_locus_plot *plot) {
   enclose(&f, plot->measured, plot->measured_count, false, true);
   enclose(&f, plot->branch, plot->branches * plot->gains, false, false);
   if (f.left < -1.2 * f.top) f.left = -1.2 * f.top;
-  // A real zero far out on the right (of a channel whose zero lies at infinity but for rounding).
-  if (f.right > 1.2 * f.top) f.right = 1.2 * f.top;
   if (plot->min_real < 0) f.left = plot->min_real;
   if (f.left == 0) f.left = -0.1 * f.top;
   f.left *= 1.06;

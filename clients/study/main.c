@@ -66,9 +66,9 @@ static const char description[] =
     "\vPLANT is a plant file with the template nano_hexapod. Each value makes a plant of its own: "
     "HAC plant (actuators to dL), IFF plant (actuators to force sensors), root loci of integral "
     "force feedback with one gain for six struts, the damping attainable for each mode, model "
-    "order, RGA "
-    "numbers, zeros, and whether the forces act along the struts. Values run side by side on the "
-    "cores, and under mpirun on several machines: the same results in the same order.\n\n"
+    "order, RGA numbers, zeros, and whether the forces act along the struts. Values run side by "
+    "side on the cores, and under mpirun on several machines: the same results in the same "
+    "order.\n\n"
     "With --live there is no PLANT: it is that of the daemon.\n\n"
     "Exit codes: 0 done, 1 failed, 2 wrong command line.";
 
