@@ -207,7 +207,7 @@ row '1.2' 'next mode' '' 'Hz' 1 modes95 /modes_hz/1
 row '1.2' 'root locus, damped plants' '' '' 1 none none '`plantbus-control iff config/plants/apa95ml-bench.json --plot`, with `--gain` for one of the table'
 printf '\nIntegral force feedback, eq. 1.4:\n'
 iff_table
-printf '\nTo measure all this as the bench did: `plantbusd --plant config/plants/apa95ml-bench.json`, then `plantbus-identify --band 10,1000 --plot`\nand `plantbus-control iff --live --plot`.\n'
+printf '\nTo measure all this as the bench did: `plantbusd --plant config/plants/apa95ml-bench.json`, then `plantbus-identify --band 10,1000 --rms 0.1 --plot`\nand `plantbus-control iff --live --rms 0.02 --plot` (the amplifier saturates at −20 V: a rms of 1 is too much at the resonance).\n'
 
 printf '\n## Actuator (2)\n\n### Selection, Table 2.1 (`plantbus-actuator select`)\n'
 selection
