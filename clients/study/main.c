@@ -134,6 +134,16 @@ static error_t parse_number(int key, char *text, struct argp_state *state) {
   return 0;
 }
 
+// Values that are no numbers of this study are a wrong command line; names are looked up later.
+static void check_values(struct argp_state *state, const study_options *o) {
+  for (size_t k = 0; k < o->values.count; k++) {
+    const pb_variation v = {.kind = o->kind, .text = o->values.name[k]};
+    pb_error err;
+    double value;
+    if (pb_variation_number(&v, &value, &err)) argp_error(state, "--values: %s", err.message);
+  }
+}
+
 static error_t parse(int key, char *text, struct argp_state *state) {
   study_options *o = state->input;
   switch (key) {
@@ -166,6 +176,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     o->plant_path = text;
     break;
   case ARGP_KEY_END:
+    check_values(state, o);
     if (o->point.from >= o->point.to) argp_error(state, "--from is not below --to");
     if (!o->live && !o->plant_path) argp_error(state, "the plant file is missing");
     if (o->live && o->plant_path) argp_error(state, "--live takes the daemon's plant, no file");
