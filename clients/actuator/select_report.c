@@ -156,6 +156,7 @@ static pb_status plot(const select_result *j, const char *path, pb_error *err) {
   double x[64], y[64];
   pb_plot_text text[64];
   size_t stroke = j->limits.count, stiffness = j->limits.count, count = 0;
+  double right = 0, top = 0;
   for (size_t k = 0; k < j->limits.count; k++) {
     if (!strcmp(j->limits.limit[k].quantity->key, "stroke")) stroke = k;
     if (!strcmp(j->limits.limit[k].quantity->key, "stiffness")) stiffness = k;
@@ -168,11 +169,14 @@ static pb_status plot(const select_result *j, const char *path, pb_error *err) {
     y[count] = 1e6 * j->candidate[i].entry[stroke].value;
     if (isnan(x[count]) || isnan(y[count])) continue;
     text[count] = (pb_plot_text){x[count], y[count], j->candidate[i].name};
+    right = fmax(right, x[count]);
+    top = fmax(top, y[count]);
     count++;
   }
   const pb_plot_curve curve = {NULL, PB_PLOT_SQUARE, 1, count, x, y};
-  const pb_plot_panel panel = {.x = {.label = "Axial stiffness (N/µm)"},
-                               .y = {.label = "Stroke (µm)"},
+  // From zero, and with room for the name of the last one.
+  const pb_plot_panel panel = {.x = {.label = "Axial stiffness (N/µm)", .max = 1.15 * right},
+                               .y = {.label = "Stroke (µm)", .max = 1.1 * top},
                                .texts = count,
                                .text = text,
                                .count = 1,

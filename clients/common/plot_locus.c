@@ -21,7 +21,8 @@ static void enclose(frame *f, const double complex *point, size_t count, bool gr
     if (grow_top && im > f->top) f->top = im;
     if (im > 1.1 * f->top) continue;
     if (re < f->left) f->left = re;
-    if (re > f->right) f->right = re;
+    // Not a real zero far out on the right: it may be one at infinity but for rounding.
+    if (re > f->right && re <= f->top) f->right = re;
   }
 }
 

@@ -37,6 +37,16 @@ static void points_clear(locus_points *p) {
   free(p->zero);
 }
 
+// Cuts a branch where it jumps: its pole has left the frequencies that are followed (twice the
+// band), and what comes after it is another one.
+static void cut_branch(double complex *point, size_t count) {
+  bool cut = false;
+  for (size_t k = 2; k < count; k++) {
+    cut = cut || cabs(point[k] - point[k - 1]) > 0.7 * fmax(cabs(point[k]), cabs(point[k - 1]));
+    if (cut) point[k] = CMPLX(NAN, NAN);
+  }
+}
+
 static pb_status fill_points(const iff_result *r, locus_points *p, pb_error *err) {
   size_t branches = r->locus.branches, gains = r->locus.gains;
   double rate = r->model->sample_rate;
@@ -58,6 +68,7 @@ static pb_status fill_points(const iff_result *r, locus_points *p, pb_error *err
     }
     p->open[p->branches] = to[0];
     p->closed[p->branches++] = to[r->chosen];
+    cut_branch(to, gains);
   }
   for (size_t k = 0; k < r->modes; k++) {
     if (isnan(r->mode[k].closed_measured.hz)) continue;

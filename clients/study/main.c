@@ -62,12 +62,13 @@ static const struct argp_option option_table[] = {
     {0}};
 
 static const char description[] =
+    "Varies one thing over a hexapod and tells what it does to its control."
     "\vPLANT is a plant file with the template nano_hexapod. Each value makes a plant of its own: "
-    "HAC "
-    "plant (actuators to dL), IFF plant (actuators to force sensors), root loci of integral force "
-    "feedback with one gain for six struts, the damping attainable for each mode, model order, RGA "
-    "numbers, zeros, and whether the forces act along the struts. Values run side by side on the "
-    "cores, and under mpirun on several machines: the same results in the same order.\n\n"
+    "HAC plant (actuators to dL), IFF plant (actuators to force sensors), root loci of integral "
+    "force feedback with one gain for six struts, the damping attainable for each mode, model "
+    "order, RGA numbers, zeros, and whether the forces act along the struts. Values run side by "
+    "side on the cores, and under mpirun on several machines: the same results in the same "
+    "order.\n\n"
     "With --live there is no PLANT: it is that of the daemon.\n\n"
     "Exit codes: 0 done, 1 failed, 2 wrong command line.";
 
@@ -133,6 +134,16 @@ static error_t parse_number(int key, char *text, struct argp_state *state) {
   return 0;
 }
 
+// Values that are no numbers of this study are a wrong command line; names are looked up later.
+static void check_values(struct argp_state *state, const study_options *o) {
+  for (size_t k = 0; k < o->values.count; k++) {
+    const pb_variation v = {.kind = o->kind, .text = o->values.name[k]};
+    pb_error err;
+    double value;
+    if (pb_variation_number(&v, &value, &err)) argp_error(state, "--values: %s", err.message);
+  }
+}
+
 static error_t parse(int key, char *text, struct argp_state *state) {
   study_options *o = state->input;
   switch (key) {
@@ -165,6 +176,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     o->plant_path = text;
     break;
   case ARGP_KEY_END:
+    check_values(state, o);
     if (o->point.from >= o->point.to) argp_error(state, "--from is not below --to");
     if (!o->live && !o->plant_path) argp_error(state, "the plant file is missing");
     if (o->live && o->plant_path) argp_error(state, "--live takes the daemon's plant, no file");

@@ -95,9 +95,9 @@ static void mpirun_gives_the_same_bits(void **state) {
   assert_string_equal(alone, together);
   free(alone);
   free(together);
-  cli_expect(PB_MPIRUN " -n 2 --oversubscribe --allow-run-as-root " STUDY "axial " HEXAPOD
-                       "--values 1e7,none",
-             1, "'none' is not a number");
+  cli_expect(PB_MPIRUN " -n 2 --oversubscribe --allow-run-as-root " STUDY "bending " HEXAPOD
+                       "--band 200,300 --values 1,2",
+             1, "at 1: ");
 #else
   print_message("built without MPI, or mpirun is not installed\n");
   skip();
@@ -172,7 +172,7 @@ static void wrong_lines_and_plants_are_told(void **state) {
   cli_expect(STUDY "bending " HEXAPOD "--band 9,3", 2, "--band");
   cli_expect(STUDY "bending " HEXAPOD "--from 10 --to 5", 2, "--from");
   cli_expect(STUDY "bending /nowhere.json", 1, "/nowhere.json");
-  cli_expect(STUDY "bending " HEXAPOD "--values 1,x", 1, "'x' is not a number");
+  cli_expect(STUDY "bending " HEXAPOD "--values 1,x", 2, "'x' is not a number");
   cli_expect(STUDY "mass " PB_CONFIG "/plants/apa300ml-bench.json", 1, "no template");
   cli_expect(STUDY "bending " HEXAPOD "--band 200,300 --values 1", 1, "at 1: ");
   cli_expect(STUDY "joint-model " HEXAPOD "--model x", 1, "NAME=JSON");
