@@ -11,6 +11,7 @@
 #include "harness.h"
 #include "plant/plant.h"
 #include "recording.h"
+#include "session_internal.h"
 #include "unit/mcap_parse.h"
 
 enum { STEPS = 2000 };
@@ -77,12 +78,21 @@ static bool drive(void *context, const pb_sample *sample, double *command) {
   return sample->step < w->last;
 }
 
-static void drive_to(pb_session *session, witness *w, uint64_t last) {
+// The daemon and a recorder of commands: a writer sends only to the readers that it knows.
+static bool two_hear_commands(void *context) {
+  const pb_session *session = context;
+  dds_publication_matched_status_t status;
+  return dds_get_publication_matched_status(session->command, &status) == DDS_RETCODE_OK &&
+         status.current_count == 2;
+}
+
+static void drive_to(pb_session *session, witness *w, uint64_t last, bool commands_recorded) {
   const pb_run_options options = {.on_sample = drive, .context = w, .stall = E2E_CAP};
   pb_error err = {PB_OK, "", ""};
   w->count = 0;
   w->last = last;
   e2e_attach(session, "test", "Va", 0.0);
+  if (commands_recorded) e2e_until(two_hear_commands, session, "the recorder hears commands");
   if (pb_session_run(session, &options, NULL, &err)) fail_msg("%s: %s", err.where, err.message);
   pb_session_detach(session);
   assert_int_equal(w->count, last + 1);
@@ -204,7 +214,7 @@ static void a_lockstep_run_is_recorded_and_repeated(void **state) {
   pb_session *session = e2e_open(&daemon);
   witness *w = calloc(1, sizeof *w);
   assert_non_null(w);
-  drive_to(session, w, STEPS);
+  drive_to(session, w, STEPS, true);
   assert_int_equal(e2e_reap(&recorder), 0);
   const mcap_parse_counts n = mcap_parse(path_of("a.mcap"));
   assert_int_equal(n.schemas, 4);
@@ -323,9 +333,9 @@ static void a_reset_begins_a_second_epoch(void **state) {
   pb_session *session = e2e_open(&daemon);
   witness *w = calloc(1, sizeof *w);
   assert_non_null(w);
-  drive_to(session, w, 100);
+  drive_to(session, w, 100, false);
   e2e_request(session, "reset", NULL);
-  drive_to(session, w, 200);
+  drive_to(session, w, 200, false);
   assert_int_equal(e2e_reap(&recorder), 0);
   pb_recording *r = open_recording();
   assert_int_equal(r->spans.count, 2);
