@@ -191,7 +191,7 @@ static pb_status hac(const pb_model *model, pb_lti *shape, pb_lti *controller, p
   double gain;
   size_t count;
   pb_status st = pb_hac_shape_discrete(&wanted, model->sample_rate, shape, err);
-  if (!st) st = pb_margins_grid(10, 1000, 40, &poles, grid, &count, err);
+  if (!st) st = pb_margins_grid(60, 140, 6, &poles, grid, &count, err);
   if (!st) st = pb_hac_plant(model, &channels, &frame, NULL, 0, *grid, count, plant, err);
   if (!st) st = pb_hac_gains(shape, *grid, count, plant, plant, 1, false, &gain, err);
   if (!st) st = pb_hac_controller(shape, &gain, &frame, 1, controller, err);

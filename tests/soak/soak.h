@@ -52,7 +52,7 @@ typedef struct soak {
   pb_session *session;
   dds_entity_t participant, status, event, command, request;
   soak_count count[SOAK_KINDS];
-  uint32_t hostile;
+  uint32_t hostile, patches;
   soak_seen seen;
 } soak;
 
