@@ -145,7 +145,8 @@ static double octave_seconds(const subject *s) {
   write_matrix(file, "hz", s->hz, 1, FREQUENCIES);
   fclose(file);
   snprintf(command, sizeof command,
-           "octave-cli --norc --quiet --eval \"sigterm_dumps_octave_core(0); pkg load control; load('%s'); s = ss(a,b,c,d); "
+           "octave-cli --norc --quiet --eval \"sigterm_dumps_octave_core(0); pkg load control; "
+           "load('%s'); s = ss(a,b,c,d); "
            "freqresp(s, 1); tic; freqresp(s, 2*pi*hz); printf('%%.9g\\n', toc)\" 2>/dev/null",
            data);
   FILE *pipe = popen(command, "r");

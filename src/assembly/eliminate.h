@@ -20,9 +20,9 @@ pb_status pb_null_build(const pb_stack_equations *stack, pb_warnings *warnings, 
                         pb_error *err);
 void pb_null_clear(pb_null_basis *basis);
 
-// Each relaxation of the stack becomes an input (its force dk δ z, which is −K's column of z) and an
-// output (δᵀq), the last ones of the stack; what the outputs so far see of z itself is taken down in
-// the system. Fails with PB_ERR_MEMORY. [init]
+// Each relaxation of the stack becomes an input (its force dk δ z, which is −K's column of z) and
+// an output (δᵀq), the last ones of the stack; what the outputs so far see of z itself is taken
+// down in the system. Fails with PB_ERR_MEMORY. [init]
 pb_status pb_relaxations_append(pb_stack_equations *stack, pb_system *system, pb_error *err);
 
 // Fills system (sizes and matrices) with the stack projected on null(G). [init]

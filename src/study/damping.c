@@ -6,8 +6,8 @@
 #include <stdlib.h>
 
 enum {
-  SWEEP = 122, // gains of the first sweep, 0 among them
-  FINER = 6,   // gains put between two of the sweep, on either side of a best one
+  SWEEP = 122,  // gains of the first sweep, 0 among them
+  FINER = 6,    // gains put between two of the sweep, on either side of a best one
 };
 
 void pb_attainable_clear(pb_attainable *a) {

@@ -32,7 +32,8 @@ typedef struct tool_result {
 // What the tool said; it must have ended.
 tool_result tool_collect(tool_process *process, int code);
 
-// Starts, waits (30 s at most, 90 under sanitizers; then it is killed and the test fails) and collects.
+// Starts, waits (30 s at most, 90 under sanitizers; then it is killed and the test fails) and
+// collects.
 tool_result tool_run(const char *name, uint32_t domain, const char *environment, const char *line);
 
 // The same with standard output as JSON; the exit code must be `code`. Owned (cJSON_Delete).
