@@ -40,9 +40,10 @@ static void begin_phase(void *context, pb_phase phase) {
 static void load_once(const char *path, double seconds[PB_PHASES]) {
   stopwatch w = {.phase = -1};
   const pb_observer observer = {begin_phase, &w};
+  const pb_means means = {.observer = &observer};
   pb_model *model = NULL;
   pb_error err = {0};
-  bench_check(pb_model_load_observed(path, &observer, NULL, &model, &err), &err);
+  bench_check(pb_model_load_with(path, &means, NULL, &model, &err), &err);
   stop(&w);
   pb_model_free(model);
   memcpy(seconds, w.seconds, sizeof w.seconds);

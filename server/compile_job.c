@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "configure.h"
+#include "pool.h"
 
 static double seconds_now(void) {
   struct timespec t;
@@ -28,24 +29,29 @@ static pb_status compatible(const pb_model *before, const pb_model *next, pb_err
   return PB_OK;
 }
 
-static pb_status compile(pb_compile_job *job) {
+static pb_status compile(pb_compile_job *job, const pb_workers *workers) {
+  const pb_means means = {.workers = workers, .elements = job->elements, .modes = job->modes};
   job->warnings.notes = &job->notes;
-  pb_status status = pb_revision_build(job->text, job->directory, job->number, job->store,
+  pb_status status = pb_revision_build(job->text, job->directory, job->number, &means,
                                        &job->warnings, &job->next, &job->err);
   if (!status) status = compatible(job->before->model, job->next->model, &job->err);
   if (status) return status;
   job->state = pb_state_new(job->next->model);
   if (!job->state) return pb_fail_memory(&job->err, "state");
   return pb_transfer_new(job->before->model, job->before->map, job->next->model, job->next->map,
-                         &job->transfer, &job->err);
+                         workers, &job->transfer, &job->err);
 }
 
-// At a lower priority than what steps and serves: on Linux a thread has a nice value of its own.
+// At a lower priority than what steps and serves: on Linux a thread has a nice value of its own,
+// and hands it on to those it starts.
 static void *compile_run(void *context) {
   pb_compile_job *job = context;
   const double begin = seconds_now();
   setpriority(PRIO_PROCESS, (id_t)syscall(SYS_gettid), 10);
-  job->status = compile(job);
+  pb_pool pool;
+  pb_pool_open(&pool);
+  job->status = compile(job, &pool.workers);
+  pb_pool_close(&pool);
   job->seconds = seconds_now() - begin;
   void (*finished)(void *) = job->finished;
   void *whose = job->context;

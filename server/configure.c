@@ -56,7 +56,8 @@ pb_status pb_configure_begin(pb_daemon *d, pb_request *request, const pb_configu
   p->job = (pb_compile_job){.text = order->text,
                             .directory = d->directory,
                             .before = pb_daemon_live(d),
-                            .store = &d->elements,
+                            .elements = &d->elements,
+                            .modes = &d->modes,
                             .number = d->revisions_made + 1,
                             .finished = compile_finished,
                             .context = d};

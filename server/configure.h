@@ -20,11 +20,12 @@ enum { PB_CONFIGURE_HISTORY = 256, PB_CONFIGURE_NAME = 64 };
 
 // What the compile thread works on.
 typedef struct pb_compile_job {
-  char *text;                 // of the changed plant file
-  const char *directory;      // of relative element paths
-  const pb_revision *before;  // what runs; stays until the job is over
-  pb_element_store *store;    // of the elements read so far; the job's until it is over
-  uint32_t number;            // of the revision to be made
+  char *text;                  // of the changed plant file
+  const char *directory;       // of relative element paths
+  const pb_revision *before;   // what runs; stays until the job is over
+  pb_element_store *elements;  // read so far; the job's until it is over
+  pb_mode_store *modes;        // solved for so far; likewise
+  uint32_t number;             // of the revision to be made
   pb_revision *next;
   pb_state *state;
   pb_transfer *transfer;

@@ -9,6 +9,7 @@
 #include <time.h>
 
 #include "base/text.h"
+#include "pool.h"
 
 int64_t pb_daemon_clock(void) {
   struct timespec t;
@@ -31,6 +32,16 @@ static pb_status names_make(pb_daemon *d, pb_error *err) {
   return d->name && d->directory ? PB_OK : pb_fail_memory(err, d->options.plant);
 }
 
+static pb_status first_build(pb_daemon *d, const char *text, const char *directory,
+                             pb_warnings *warnings, pb_error *err) {
+  pb_pool pool;
+  pb_pool_open(&pool);
+  const pb_means means = {.workers = &pool.workers, .elements = &d->elements, .modes = &d->modes};
+  pb_status status = pb_revision_build(text, directory, 1, &means, warnings, &d->live, err);
+  pb_pool_close(&pool);
+  return status;
+}
+
 static pb_status plant_load(pb_daemon *d, pb_warnings *warnings, pb_error *err) {
   char *text = NULL, *path = pb_text_copy(d->options.plant);
   size_t length;
@@ -38,8 +49,7 @@ static pb_status plant_load(pb_daemon *d, pb_warnings *warnings, pb_error *err) 
                           : pb_fail_memory(err, d->options.plant);
   if (!status && strlen(text) != length)
     status = pb_fail(err, PB_ERR_SYNTAX, d->options.plant, "holds a NUL");
-  if (!status)
-    status = pb_revision_build(text, dirname(path), 1, &d->elements, warnings, &d->live, err);
+  if (!status) status = first_build(d, text, dirname(path), warnings, err);
   free(text);
   free(path);
   if (!status) status = names_make(d, err);
@@ -47,9 +57,16 @@ static pb_status plant_load(pb_daemon *d, pb_warnings *warnings, pb_error *err) 
   return status;
 }
 
-// Before the middleware makes its threads and buffers. What is refused is told in `status`.
+// Before the middleware makes its threads and buffers. What there is is brought in at once; what is
+// mapped later stays in memory from its first touch on, which is the compile thread's. Otherwise
+// each large array of a change would be brought in page by page when it is mapped, at a multiple of
+// the cost, before it can ask for large pages. What is refused is told in `status`.
 static void memory_lock(pb_daemon *d) {
-  if (d->options.lock_memory) d->memory_locked = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
+  if (!d->options.lock_memory) return;
+  d->memory_locked = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
+#ifdef MCL_ONFAULT
+  if (d->memory_locked) mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT);
+#endif
 }
 
 static pb_status service_start(pb_daemon *d, pb_error *err) {
@@ -118,6 +135,7 @@ bool pb_daemon_stop(pb_daemon *d) {
   if (!whole) return false;
   pb_revision_free(d->live);
   pb_element_store_clear(&d->elements);
+  pb_mode_store_clear(&d->modes);
   free(d->name);
   free(d->directory);
   pthread_mutex_destroy(&d->lock);

@@ -99,6 +99,7 @@ typedef struct pb_daemon {
 
   // of the service thread
   pb_element_store elements;  // read so far; the compile thread's while there is one
+  pb_mode_store modes;        // solved for so far; likewise
   pb_pending pending;         // but for what configure.h says is under lock
   const pb_host *host;        // hosted items, as of the last change made
   pb_history_entry history[PB_CONFIGURE_HISTORY];

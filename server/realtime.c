@@ -125,12 +125,19 @@ static bool overrun_follow(pb_realtime *rt, step_run *run, int64_t behind) {
   }
 }
 
+// So that no step is the first to need a page of the stack.
+static void stack_touch(void) {
+  volatile char page[64 << 10];
+  for (size_t i = 0; i < sizeof page; i += 4096) page[i] = 0;
+}
+
 // Deadline k is start + k·interval, computed anew each time: no rounding adds up.
 static void *step_thread(void *context) {
   pb_realtime *rt = context;
   step_run run = {.former_revision = UINT32_MAX,
                   .interval = 1e9 / (rt->stepper->model->sample_rate * rt->options.speed)};
   prctl(PR_SET_NAME, "pb-step");
+  stack_touch();
   scheduling_ask(rt);
   run.start = clock_now();
   for (run.k = 1; !atomic_load_explicit(&rt->stop, memory_order_relaxed); run.k++) {

@@ -19,14 +19,14 @@ static pb_status hash_text(const char *text, char hex[65], pb_error *err) {
 }
 
 pb_status pb_revision_build(const char *text, const char *directory, uint32_t number,
-                            pb_element_store *store, pb_warnings *warnings, pb_revision **out,
+                            const pb_means *means, pb_warnings *warnings, pb_revision **out,
                             pb_error *err) {
   *out = NULL;
   pb_revision *r = calloc(1, sizeof *r);
   if (!r) return pb_fail_memory(err, "revision");
   r->number = number;
-  pb_status status = pb_model_parse_stored(text, strlen(text), directory, store, NULL, warnings,
-                                           &r->model, &r->map, &r->text, err);
+  pb_status status = pb_model_parse_with(text, strlen(text), directory, means, warnings, &r->model,
+                                         &r->map, &r->text, err);
   if (!status && !pb_plant_name_valid(r->model->name))
     status =
         pb_fail(err, PB_ERR_SCHEMA, "/name",

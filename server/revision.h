@@ -19,12 +19,12 @@ typedef struct pb_revision {
   size_t packed_count;
 } pb_revision;
 
-// Builds a revision from a plant file's text; element paths are relative to directory, elements of
-// the store (NULL: none) are not read again. Seconds for a large plant. Fails as loading and
+// Builds a revision from a plant file's text; element paths are relative to directory, `means` is
+// what there is to build it with (NULL: nothing). Seconds for a large plant. Fails as loading and
 // compiling do, and with PB_ERR_SCHEMA when the name cannot be a partition, PB_ERR_ARGUMENT when
 // the bus cannot carry the signals. [init]
 pb_status pb_revision_build(const char *text, const char *directory, uint32_t number,
-                            pb_element_store *store, pb_warnings *warnings, pb_revision **out,
+                            const pb_means *means, pb_warnings *warnings, pb_revision **out,
                             pb_error *err);
 void pb_revision_free(pb_revision *revision);
 

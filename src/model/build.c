@@ -94,6 +94,12 @@ void pb_model_builder_discard(pb_model_builder *b) {
   *b = (pb_model_builder){0};
 }
 
+static void add_block(pb_model *m, size_t size) {
+  m->blocks++;
+  m->block_start[m->blocks] = m->block_start[m->blocks - 1] + size;
+  m->block_value[m->blocks] = m->block_value[m->blocks - 1] + size * size;
+}
+
 // Copies a block into model m at its end; its arrays are large enough.
 static void append(pb_model *m, const pb_model_part *p) {
   size_t start = m->block_start[m->blocks], value = m->block_value[m->blocks];
@@ -103,23 +109,38 @@ static void append(pb_model *m, const pb_model_part *p) {
     memcpy(m->b + start + i * m->nx, p->b + i * p->ldb, p->size * sizeof(double));
   for (size_t j = 0; j < p->size; j++)
     memcpy(m->c + (start + j) * m->ny, p->c + j * p->ldc, m->ny * sizeof(double));
-  m->blocks++;
-  m->block_start[m->blocks] = start + p->size;
-  m->block_value[m->blocks] = value + p->size * p->size;
+  add_block(m, p->size);
+}
+
+// So that the state matrix may have this many entries.
+static pb_status grow(pb_model_builder *b, size_t needed, pb_error *err) {
+  if (needed <= b->capacity) return PB_OK;
+  const size_t capacity = 2 * b->capacity > needed ? 2 * b->capacity : needed;
+  double *a = realloc(b->model->a, capacity * sizeof *a);
+  if (a) b->model->a = a;
+  double *ad = a ? realloc(b->model->ad, capacity * sizeof *ad) : NULL;
+  if (!ad) return pb_fail_memory(err, "");
+  b->model->ad = ad;
+  b->capacity = capacity;
+  return PB_OK;
 }
 
 pb_status pb_model_builder_add(pb_model_builder *b, const pb_model_part *part, pb_error *err) {
   pb_model *m = b->model;
-  size_t needed = m->block_value[m->blocks] + part->size * part->size;
-  if (needed > b->capacity) {
-    size_t capacity = 2 * b->capacity > needed ? 2 * b->capacity : needed;
-    double *a = realloc(m->a, capacity * sizeof *a);
-    if (!a) return pb_fail_memory(err, "");
-    m->a = a;
-    b->capacity = capacity;
-  }
-  append(m, part);
-  return PB_OK;
+  pb_status st = grow(b, m->block_value[m->blocks] + part->size * part->size, err);
+  if (!st) append(m, part);
+  return st;
+}
+
+pb_status pb_model_builder_reserve(pb_model_builder *b, const size_t *size, size_t count,
+                                   size_t *first, pb_error *err) {
+  pb_model *m = b->model;
+  size_t needed = m->block_value[m->blocks];
+  for (size_t k = 0; k < count; k++) needed += size[k] * size[k];
+  pb_status st = grow(b, needed, err);
+  *first = m->blocks;
+  for (size_t k = 0; k < count && !st; k++) add_block(m, size[k]);
+  return st;
 }
 
 static pb_model_part part_of(const pb_model *m, size_t block) {
@@ -242,20 +263,35 @@ static pb_status make_steps(pb_model *m, pb_error *err) {
   return st ? st : pb_step_pack_model(m, err);
 }
 
-// The blocks of m in order, those above hz (0: none) gone into the first columns of d.
-static pb_status rebuild(const pb_model *m, double hz, size_t direct, bool steps, pb_model **out,
-                         pb_error *err) {
-  double limit = hz > 0 ? two_pi * hz : INFINITY;
-  size_t kept = 0, nx = 0, values = 0;
+// The order of m's blocks; NULL: out of memory.
+static rank *rank_blocks(const pb_model *m, double hz) {
+  const double limit = hz > 0 ? two_pi * hz : INFINITY;
   rank *order = malloc((m->blocks + 1) * sizeof *order);
-  if (!order) return pb_fail_memory(err, "");
+  if (!order) return NULL;
   for (size_t k = 0; k < m->blocks; k++) {
     pb_model_part p = part_of(m, k);
     order[k] = (rank){k, p.size != 2, slowest(&p) > limit, pb_block_frequency(p.a, p.size)};
-    if (order[k].fast) continue;
-    kept++, nx += p.size, values += p.size * p.size;
   }
   qsort(order, m->blocks, sizeof *order, rank_order);
+  return order;
+}
+
+// All are kept, where they are.
+static bool nothing_moves(const pb_model *m, const rank *order) {
+  for (size_t k = 0; k < m->blocks; k++)
+    if (order[k].block != k || order[k].fast) return false;
+  return true;
+}
+
+// The blocks of m in this order, those above hz (0: none) gone into the first columns of d.
+static pb_status rebuild(const pb_model *m, const rank *order, double hz, size_t direct, bool steps,
+                         pb_model **out, pb_error *err) {
+  size_t kept = 0, nx = 0, values = 0;
+  for (size_t k = 0; k < m->blocks; k++) {
+    if (order[k].fast) continue;
+    const pb_model_part p = part_of(m, order[k].block);
+    kept++, nx += p.size, values += p.size * p.size;
+  }
   pb_model *copy = pb_model_allocate(nx, m->nu, m->ny, m->modes, kept, values);
   pb_status st = copy ? copy_signals(m, copy, err) : pb_fail_memory(err, "");
   if (!st) {
@@ -271,7 +307,6 @@ static pb_status rebuild(const pb_model *m, double hz, size_t direct, bool steps
       append(copy, &p);
   }
   if (!st && steps) st = make_steps(copy, err);
-  free(order);
   if (st) {
     pb_model_free(copy);
   } else {
@@ -307,7 +342,22 @@ pb_status pb_model_narrow(const pb_model *m, size_t nu, size_t ny, pb_model **ou
 
 pb_status pb_model_builder_close(pb_model_builder *b, double max_frequency, pb_model **out,
                                  pb_error *err) {
-  pb_status st = rebuild(b->model, max_frequency, b->direct, !b->plain, out, err);
+  rank *order = rank_blocks(b->model, max_frequency);
+  pb_status st = PB_OK;
+  if (!order) {
+    st = pb_fail_memory(err, "");
+  } else if (nothing_moves(b->model, order) &&
+             b->model->block_start[b->model->blocks] == b->model->nx) {
+    b->model->max_frequency = max_frequency;
+    if (!b->plain) st = make_steps(b->model, err);
+    if (!st) {
+      *out = b->model;
+      b->model = NULL;
+    }
+  } else {
+    st = rebuild(b->model, order, max_frequency, b->direct, !b->plain, out, err);
+  }
+  free(order);
   pb_model_builder_discard(b);
   return st;
 }
@@ -315,7 +365,11 @@ pb_status pb_model_builder_close(pb_model_builder *b, double max_frequency, pb_m
 pb_status pb_model_truncate(const pb_model *model, double hz, pb_model **out, pb_error *err) {
   *out = NULL;
   if (!(hz > 0)) return pb_fail(err, PB_ERR_ARGUMENT, "max_frequency", "expected a number > 0");
-  return rebuild(model, hz, model->nu, true, out, err);
+  rank *order = rank_blocks(model, hz);
+  if (!order) return pb_fail_memory(err, "max_frequency");
+  pb_status st = rebuild(model, order, hz, model->nu, true, out, err);
+  free(order);
+  return st;
 }
 
 pb_status pb_model_discretize(pb_model *m, pb_error *err) {

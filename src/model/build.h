@@ -25,6 +25,11 @@ pb_status pb_model_builder_open(pb_model_builder *builder, size_t nx, size_t nu,
 
 pb_status pb_model_builder_add(pb_model_builder *builder, const pb_model_part *part, pb_error *err);
 
+// Room for `count` more blocks of these sizes, for the caller to fill: entries of a from
+// block_value of block *first on, rows of b and columns of c from its block_start on.
+pb_status pb_model_builder_reserve(pb_model_builder *builder, const size_t *size, size_t count,
+                                   size_t *first, pb_error *err);
+
 // Sorts the blocks by natural frequency, 2 × 2 blocks first; replaces those above max_frequency
 // (Hz; 0: none) by their static contribution; discretises unless it is plain. The builder is empty
 // afterwards.

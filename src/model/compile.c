@@ -50,7 +50,8 @@ static size_t find_groups(const pb_modes *m, size_t *parent, size_t *group) {
   return count;
 }
 
-static pb_status build_groups(const pb_modes *m, pb_model_builder *builder, pb_error *err) {
+static pb_status build_groups(const pb_modes *m, const pb_means *means, pb_model_builder *builder,
+                              pb_error *err) {
   size_t *parent = malloc(m->n * sizeof *parent), *group = malloc(m->n * sizeof *group);
   size_t *list = malloc(m->n * sizeof *list);
   pb_status st = PB_OK;
@@ -63,7 +64,7 @@ static pb_status build_groups(const pb_modes *m, pb_model_builder *builder, pb_e
     size_t count = 0;
     for (size_t j = 0; j < m->n; j++)
       if (group[j] == g) list[count++] = j;
-    st = pb_group_build(m, list, count, builder, err);
+    st = pb_group_build(m, list, count, means, builder, err);
   }
 done:
   free(parent);
@@ -135,22 +136,24 @@ static pb_status fill_header(const pb_system *s, const pb_modes *m, pb_model *mo
   return fill_signals(s, model, err);
 }
 
-pb_status pb_model_compile_observed(const pb_system *s, const pb_observer *observer,
-                                    pb_warnings *warnings, pb_model **out, pb_error *err) {
+pb_status pb_model_compile_with(const pb_system *s, const pb_means *lent, pb_warnings *warnings,
+                                pb_model **out, pb_error *err) {
+  const pb_means means = pb_means_of(lent);
   *out = NULL;
   pb_modes modes = {0};
   pb_model_builder builder = {0};
   const size_t nu = s->nu + 2 * s->stacked, ny = s->ny + 2 * s->stacked;
-  pb_phase_begin(observer, PB_PHASE_MODES);
-  pb_status st = pb_modes_solve(s, warnings, &modes, err);
-  pb_phase_begin(observer, PB_PHASE_DAMP);
+  pb_mode_store_begin(means.modes);
+  pb_phase_begin(means.observer, PB_PHASE_MODES);
+  pb_status st = pb_modes_solve(s, &means, warnings, &modes, err);
+  pb_phase_begin(means.observer, PB_PHASE_DAMP);
   if (!st) st = pb_model_builder_open(&builder, 2 * s->n, nu, ny, s->n, err);
   builder.plain = s->stacked > 0;
   builder.direct = s->nu;
   if (!st) st = fill_header(s, &modes, builder.model, err);
-  if (!st) st = build_groups(&modes, &builder, err);
+  if (!st) st = build_groups(&modes, &means, &builder, err);
   pb_modes_clear(&modes);
-  pb_phase_begin(observer, PB_PHASE_DISCRETIZE);
+  pb_phase_begin(means.observer, PB_PHASE_DISCRETIZE);
   if (!st && s->relaxations == 0)
     st = pb_model_builder_close(&builder, s->plant->max_frequency, out, err);
   else if (!st)
@@ -161,23 +164,24 @@ pb_status pb_model_compile_observed(const pb_system *s, const pb_observer *obser
 
 pb_status pb_model_compile(const pb_system *s, pb_warnings *warnings, pb_model **out,
                            pb_error *err) {
-  return pb_model_compile_observed(s, NULL, warnings, out, err);
+  return pb_model_compile_with(s, NULL, warnings, out, err);
 }
 
-pb_status pb_model_load_observed(const char *path, const pb_observer *observer,
-                                 pb_warnings *warnings, pb_model **out, pb_error *err) {
+pb_status pb_model_load_with(const char *path, const pb_means *lent, pb_warnings *warnings,
+                             pb_model **out, pb_error *err) {
+  const pb_means means = pb_means_of(lent);
   *out = NULL;
   pb_plant *plant = NULL;
   pb_system *system = NULL;
-  pb_phase_begin(observer, PB_PHASE_READ);
+  pb_phase_begin(means.observer, PB_PHASE_READ);
   pb_status st = pb_plant_load(path, warnings, &plant, err);
-  if (!st) st = pb_system_assemble_observed(plant, observer, warnings, &system, NULL, err);
-  if (!st) st = pb_model_compile_observed(system, observer, warnings, out, err);
+  if (!st) st = pb_system_assemble_observed(plant, means.observer, warnings, &system, NULL, err);
+  if (!st) st = pb_model_compile_with(system, &means, warnings, out, err);
   pb_system_free(system);
   pb_plant_free(plant);
   return st;
 }
 
 pb_status pb_model_load(const char *path, pb_warnings *warnings, pb_model **out, pb_error *err) {
-  return pb_model_load_observed(path, NULL, warnings, out, err);
+  return pb_model_load_with(path, NULL, warnings, out, err);
 }

@@ -13,6 +13,13 @@ static const double tolerance = 1e-13;  // of a residual against its eigenvalue;
 static const double most_tilt = 0.7;    // below 1 the vectors stay independent
 enum { MOST_SWEEPS = 30, MOST_STALLS = 3, BATCH = PB_DAMPED_BATCH };
 
+// Columns of a batch where `count` are left: fewer than the most, so that a late sweep, too, can be
+// shared; whatever the number of workers.
+static size_t batch_size(size_t count) {
+  const size_t quarter = (count / 4 + 15) / 16 * 16;
+  return quarter < 16 ? 16 : quarter > BATCH ? BATCH : quarter;
+}
+
 void pb_damped_clear(pb_damped *d) {
   pb_clusters_clear(&d->cluster);
   for (int i = 0; i < 2; i++) {
@@ -22,16 +29,26 @@ void pb_damped_clear(pb_damped *d) {
   *d = (pb_damped){0};
 }
 
+static void space_clear(pb_damped_space *s) {
+  free(s->in);
+  free(s->out);
+  for (int i = 0; i < 2; i++) {
+    free(s->r[i]);
+    free(s->dx[i]);
+    free(s->along[i]);
+  }
+  free(s->basis);
+}
+
 static void iteration_clear(pb_iteration *it) {
+  for (size_t w = 0; it->space && w < pb_workers_count(it->workers); w++)
+    space_clear(&it->space[w]);
+  free(it->space);
   free(it->c);
   free(it->w2);
-  free(it->in);
-  free(it->out);
-  for (int i = 0; i < 2; i++) {
-    free(it->r[i]);
-    free(it->dx[i]);
-    free(it->along[i]);
-  }
+  free(it->list);
+  free(it->residual);
+  free(it->turned_by);
   free(it->basis);
   free(it->active);
   free(it->error);
@@ -56,20 +73,37 @@ static bool result_new(pb_damped *d) {
   return ok;
 }
 
-static bool iteration_new(pb_damped *d, pb_iteration *it) {
-  const size_t n = d->n, count = d->cluster.count, wide = 2 * d->cluster.widest;
-  *it = (pb_iteration){.d = d, .widest = wide};
+static bool space_new(size_t n, size_t batch, size_t wide, pb_damped_space *s) {
   bool ok = true;
   for (int i = 0; i < 2; i++) {
-    it->r[i] = pb_array_new(n * BATCH, sizeof(double));
-    it->dx[i] = pb_array_new(n * BATCH, sizeof(double));
-    it->along[i] = pb_array_new(2 * BATCH * wide, sizeof(double));
-    ok = ok && it->r[i] && it->dx[i] && it->along[i];
+    s->r[i] = pb_array_new(n * batch, sizeof(double));
+    s->dx[i] = pb_array_new(n * batch, sizeof(double));
+    s->along[i] = pb_array_new(2 * BATCH * wide, sizeof(double));
+    ok = ok && s->r[i] && s->dx[i] && s->along[i];
   }
+  s->in = pb_array_new(n * batch, sizeof(double));
+  s->out = pb_array_new(n * batch, sizeof(double));
+  s->basis = pb_array_new(2 * wide * wide, sizeof(double));
+  return ok && s->in && s->out && s->basis;
+}
+
+static bool spaces_new(size_t n, size_t wide, pb_iteration *it) {
+  const size_t count = pb_workers_count(it->workers), batch = batch_size(it->d->columns);
+  it->space = calloc(count, sizeof *it->space);
+  bool ok = it->space != NULL;
+  for (size_t w = 0; w < count && ok; w++) ok = space_new(n, batch, wide, &it->space[w]);
+  return ok;
+}
+
+static bool iteration_new(pb_damped *d, const pb_workers *workers, pb_iteration *it) {
+  const size_t n = d->n, count = d->cluster.count, wide = 2 * d->cluster.widest;
+  *it = (pb_iteration){.d = d, .workers = workers, .widest = wide};
+  bool ok = spaces_new(n, wide, it);
   it->c = pb_array_new(n * n, sizeof(double));
   it->w2 = malloc(n * sizeof(double));
-  it->in = pb_array_new(n * BATCH, sizeof(double));
-  it->out = pb_array_new(n * BATCH, sizeof(double));
+  it->list = malloc(d->columns * sizeof *it->list);
+  it->residual = malloc(d->columns * sizeof *it->residual);
+  it->turned_by = malloc(d->columns * sizeof *it->turned_by);
   it->basis = pb_array_new(2 * wide * wide, sizeof(double));
   it->active = malloc(count * sizeof(bool));
   it->error = malloc(count * sizeof(double));
@@ -81,8 +115,9 @@ static bool iteration_new(pb_damped *d, pb_iteration *it) {
   it->rwork = pb_array_new(2 * wide, sizeof(double));
   it->turned = pb_array_new(2 * n * wide, sizeof(double));
   it->pivot = malloc(wide * sizeof(int));
-  ok = ok && it->c && it->w2 && it->basis && it->in && it->out && it->active && it->error &&
-       it->home && it->value && it->t && it->z && it->work && it->rwork && it->turned && it->pivot;
+  ok = ok && it->c && it->w2 && it->list && it->residual && it->turned_by && it->basis &&
+       it->active && it->error && it->home && it->value && it->t && it->z && it->work &&
+       it->rwork && it->turned && it->pivot;
   if (!ok) return false;
   it->value[0] = 0;
   for (size_t c = 0; c < count; c++) {
@@ -132,33 +167,50 @@ static void multiply_first(pb_iteration *it) {
 }
 
 // P = Ĉ X of the columns k[count].
-static void multiply(pb_iteration *it, const size_t *k, size_t count) {
+static void multiply(const pb_iteration *it, pb_damped_space *s, const size_t *k, size_t count) {
   const size_t n = it->d->n;
   const int size = (int)n, columns = (int)count;
   const double one = 1, zero = 0;
   for (int part = 0; part < 2; part++) {
     for (size_t i = 0; i < count; i++)
-      memcpy(it->in + i * n, it->d->x[part] + k[i] * n, n * sizeof(double));
-    dgemm_("N", "N", &size, &columns, &size, &one, it->c, &size, it->in, &size, &zero, it->out,
+      memcpy(s->in + i * n, it->d->x[part] + k[i] * n, n * sizeof(double));
+    dgemm_("N", "N", &size, &columns, &size, &one, it->c, &size, s->in, &size, &zero, s->out,
            &size);
     for (size_t i = 0; i < count; i++)
-      memcpy(it->d->p[part] + k[i] * n, it->out + i * n, n * sizeof(double));
+      memcpy(it->d->p[part] + k[i] * n, s->out + i * n, n * sizeof(double));
   }
+}
+
+static void correct_first(void *context, size_t item, size_t worker) {
+  const pb_iteration *it = context;
+  const size_t batch = batch_size(it->count), first = item * batch;
+  const size_t count = it->count - first < batch ? it->count - first : batch;
+  pb_damped_correct(it, &it->space[worker], it->list + first, count);
+}
+
+static void correct_next(void *context, size_t item, size_t worker) {
+  const pb_iteration *it = context;
+  const size_t batch = batch_size(it->count), first = item * batch;
+  const size_t count = it->count - first < batch ? it->count - first : batch;
+  multiply(it, &it->space[worker], it->list + first, count);
+  pb_damped_correct(it, &it->space[worker], it->list + first, count);
 }
 
 // Residuals and corrections of all active columns.
 static void sweep(pb_iteration *it, bool first) {
-  size_t list[BATCH], count = 0, columns = it->d->columns;
-  for (size_t c = 0; c < it->d->cluster.count; c++)
-    if (it->active[c]) it->error[c] = 0;
+  it->count = 0;
   it->tilt = 0;
+  for (size_t k = 0; k < it->d->columns; k++)
+    if (it->active[it->home[k]]) it->list[it->count++] = k;
+  for (size_t i = 0; i < it->count; i++) it->error[it->home[it->list[i]]] = 0;
   if (first) multiply_first(it);
-  for (size_t k = 0; k <= columns; k++) {
-    if (k < columns && it->active[it->home[k]]) list[count++] = k;
-    if (count < BATCH && k < columns) continue;
-    if (count && !first) multiply(it, list, count);
-    if (count) pb_damped_correct(it, list, count);
-    count = 0;
+  const size_t batch = batch_size(it->count);
+  pb_workers_run(it->workers, (it->count + batch - 1) / batch, first ? correct_first : correct_next,
+                 it);
+  for (size_t i = 0; i < it->count; i++) {
+    const size_t k = it->list[i], home = it->home[k];
+    it->error[home] = fmax(it->error[home], it->residual[k]);
+    if (!(it->turned_by[k] <= it->tilt)) it->tilt = it->turned_by[k];  // NaN too
   }
 }
 
@@ -183,14 +235,14 @@ static bool iterate(pb_iteration *it) {
   return false;
 }
 
-pb_status pb_damped_solve(size_t n, const double *omega, const double *damping, pb_damped *out,
-                          bool *solved, pb_error *err) {
+pb_status pb_damped_solve(size_t n, const double *omega, const double *damping,
+                          const pb_workers *workers, pb_damped *out, bool *solved, pb_error *err) {
   pb_iteration it = {0};
   *out = (pb_damped){.n = n};
   pb_status st = pb_clusters_make(n, omega, damping, &out->cluster, solved, err);
   if (st || !*solved) return st;
   out->columns = out->cluster.column[out->cluster.count];
-  if (!result_new(out) || !iteration_new(out, &it)) st = pb_fail_memory(err, "");
+  if (!result_new(out) || !iteration_new(out, workers, &it)) st = pb_fail_memory(err, "");
   if (!st) {
     begin(omega, damping, &it);
     *solved = iterate(&it);

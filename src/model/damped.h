@@ -15,6 +15,7 @@
 #ifndef PB_MODEL_DAMPED_H
 #define PB_MODEL_DAMPED_H
 
+#include "base/workers.h"
 #include "model/cluster.h"
 
 typedef struct pb_damped {
@@ -27,8 +28,8 @@ typedef struct pb_damped {
 // Solves for all eigenpairs. omega [n] rad/s, ascending or not; damping n × n, symmetric. *solved
 // false, and *out empty: the coupling is too strong or the vectors too ill-conditioned for this
 // method. Fails with PB_ERR_MEMORY. [init]
-pb_status pb_damped_solve(size_t n, const double *omega, const double *damping, pb_damped *out,
-                          bool *solved, pb_error *err);
+pb_status pb_damped_solve(size_t n, const double *omega, const double *damping,
+                          const pb_workers *workers, pb_damped *out, bool *solved, pb_error *err);
 void pb_damped_clear(pb_damped *damped);
 
 #endif

@@ -19,14 +19,14 @@ typedef struct columns {
 } columns;
 
 // R = λ² X + λ P + Ω² X
-static void residual(const pb_iteration *it, const columns *s) {
+static void residual(const pb_iteration *it, const pb_damped_space *space, const columns *s) {
   const pb_damped *d = it->d;
   const size_t n = d->n;
   for (size_t k = 0; k < s->count; k++) {
     const double lr = s->re[k], li = s->im[k], l2r = lr * lr - li * li, l2i = 2 * lr * li;
     const double *xr = d->x[0] + s->k[k] * n, *xi = d->x[1] + s->k[k] * n;
     const double *pr = d->p[0] + s->k[k] * n, *pi = d->p[1] + s->k[k] * n;
-    double *rr = it->r[0] + k * n, *ri = it->r[1] + k * n;
+    double *rr = space->r[0] + k * n, *ri = space->r[1] + k * n;
     for (size_t i = 0; i < n; i++) {
       const double w2 = l2r + it->w2[i];
       rr[i] = w2 * xr[i] - l2i * xi[i] + lr * pr[i] - li * pi[i];
@@ -44,29 +44,29 @@ static void split(const double complex *v, size_t modes, size_t size, double sig
 }
 
 // along = (Rᵀ of the cluster's rows) [Y_r Y_i], columns × 2 eigenpairs, of R_r and of R_i.
-static void project(pb_iteration *it, size_t c, const columns *s) {
+static void project(const pb_iteration *it, pb_damped_space *space, size_t c, const columns *s) {
   const pb_clusters *q = &it->d->cluster;
   const int n = (int)it->d->n, modes = (int)(q->start[c + 1] - q->start[c]), rows = BATCH;
   const size_t size = q->column[c + 1] - q->column[c];
   const int count = (int)s->count, twice = (int)(2 * size);
   const double one = 1, zero = 0;
-  split(q->y + q->value[c], (size_t)modes, size, 1, it->basis);
+  split(q->y + q->value[c], (size_t)modes, size, 1, space->basis);
   for (int part = 0; part < 2; part++)
-    dgemm_("T", "N", &count, &twice, &modes, &one, it->r[part] + q->start[c], &n, it->basis, &modes,
-           &zero, it->along[part], &rows);
+    dgemm_("T", "N", &count, &twice, &modes, &one, space->r[part] + q->start[c], &n, space->basis,
+           &modes, &zero, space->along[part], &rows);
 }
 
 // dX of the cluster's rows = v e + v̄ f; along holds [Re(e + f), Im(e − f)], [Im(e + f), Re(e − f)].
-static void expand(pb_iteration *it, size_t c, const columns *s) {
+static void expand(const pb_iteration *it, pb_damped_space *space, size_t c, const columns *s) {
   const pb_clusters *q = &it->d->cluster;
   const int n = (int)it->d->n, modes = (int)(q->start[c + 1] - q->start[c]), rows = BATCH;
   const size_t size = q->column[c + 1] - q->column[c];
   const int count = (int)s->count, twice = (int)(2 * size);
   const double one = 1, zero = 0;
   for (int part = 0; part < 2; part++) {
-    split(q->v + q->value[c], (size_t)modes, size, part ? 1 : -1, it->basis);
-    dgemm_("N", "T", &modes, &count, &twice, &one, it->basis, &modes, it->along[part], &rows, &zero,
-           it->dx[part] + q->start[c], &n);
+    split(q->v + q->value[c], (size_t)modes, size, part ? 1 : -1, space->basis);
+    dgemm_("N", "T", &modes, &count, &twice, &one, space->basis, &modes, space->along[part], &rows,
+           &zero, space->dx[part] + q->start[c], &n);
   }
 }
 
@@ -96,15 +96,16 @@ static void divide(double complex lambda, double mirror, const double *apart, do
 }
 
 // All corrections along the eigenvectors of cluster c; inside[2]: which columns are its own.
-static void correct_along(pb_iteration *it, size_t c, const size_t inside[2], columns *s) {
+static void correct_along(const pb_iteration *it, pb_damped_space *space, size_t c,
+                          const size_t inside[2], columns *s) {
   const pb_clusters *q = &it->d->cluster;
   const size_t first = q->column[c], size = q->column[c + 1] - first, pairs = q->pairs[c];
   double apart[BATCH];
   for (size_t k = 0; k < s->count; k++) apart[k] = 1;
-  project(it, c, s);
+  project(it, space, c, s);
   for (size_t j = 0; j < size; j++) {
-    double *const a[2] = {it->along[0] + j * BATCH, it->along[0] + (size + j) * BATCH};
-    double *const b[2] = {it->along[1] + j * BATCH, it->along[1] + (size + j) * BATCH};
+    double *const a[2] = {space->along[0] + j * BATCH, space->along[0] + (size + j) * BATCH};
+    double *const b[2] = {space->along[1] + j * BATCH, space->along[1] + (size + j) * BATCH};
     for (size_t k = inside[0]; k < inside[1]; k++) {
       const size_t rank = s->k[k] - first;
       const bool own = rank == j || (j < pairs && rank < pairs);
@@ -114,10 +115,11 @@ static void correct_along(pb_iteration *it, size_t c, const size_t inside[2], co
     }
     divide(q->lambda[first + j], j < pairs ? 1 : 0, apart, a, b, s);
   }
-  expand(it, c, s);
+  expand(it, space, c, s);
 }
 
-void pb_damped_correct(pb_iteration *it, const size_t *k, size_t count) {
+void pb_damped_correct(const pb_iteration *it, pb_damped_space *space, const size_t *k,
+                       size_t count) {
   pb_damped *d = it->d;
   const pb_clusters *q = &d->cluster;
   const size_t n = d->n;
@@ -127,20 +129,20 @@ void pb_damped_correct(pb_iteration *it, const size_t *k, size_t count) {
     s.im[i] = cimag(q->lambda[k[i]]);
     s.size2[i] = s.re[i] * s.re[i] + s.im[i] * s.im[i];
   }
-  residual(it, &s);
+  residual(it, space, &s);
   for (size_t c = 0, next = 0; c < q->count; c++) {
     const size_t from = next;
     while (next < count && it->home[k[next]] == c) next++;
     const size_t inside[2] = {from, next};
-    correct_along(it, c, inside, &s);
+    correct_along(it, space, c, inside, &s);
   }
   for (size_t i = 0; i < count; i++) {
     const size_t home = it->home[k[i]];
     const bool real = k[i] - q->column[home] >= q->pairs[home];
-    it->error[home] = fmax(it->error[home], sqrt(s.error2[i]));
-    if (!(s.tilt[i] <= it->tilt)) it->tilt = s.tilt[i];  // NaN too
+    it->residual[k[i]] = sqrt(s.error2[i]);
+    it->turned_by[k[i]] = s.tilt[i];
     for (int part = 0; part < (real ? 1 : 2); part++)
-      for (size_t r = 0; r < n; r++) d->x[part][r + k[i] * n] += it->dx[part][r + i * n];
+      for (size_t r = 0; r < n; r++) d->x[part][r + k[i] * n] += space->dx[part][r + i * n];
   }
 }
 

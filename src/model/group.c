@@ -7,27 +7,54 @@
 
 #include "base/array.h"
 #include "base/lapack.h"
+#include "base/product.h"
 #include "model/block.h"
 #include "model/cluster.h"
+
+// A state matrix by its blocks: A V = V diag(blocks). What a store keeps.
+typedef struct diagonal {
+  double *a, *v;  // n × n
+  size_t *size;   // [n] block sizes
+  size_t blocks;
+} diagonal;
 
 // One group's equations in its own states: s η and η̇ of each of its modes.
 typedef struct group_system {
   size_t modes, n;     // g, 2g
   const size_t *mode;  // [g]
-  double *a, *v;       // n × n
+  double *a;           // n × n
   size_t nu, ny;       // with those of stacked coordinates
   double *b;           // n × nu
   double *c;           // ny × n
-  size_t *size;        // [n] block sizes
-  size_t blocks;
+  const diagonal *d;   // of a store, or `own`
+  diagonal *own;
 } group_system;
+
+static void diagonal_free(void *value) {
+  diagonal *d = value;
+  if (!d) return;
+  free(d->a);
+  free(d->v);
+  free(d->size);
+  free(d);
+}
+
+static diagonal *diagonal_new(size_t n) {
+  diagonal *d = calloc(1, sizeof *d);
+  if (!d) return NULL;
+  d->a = pb_array_new(n * n, sizeof *d->a);
+  d->v = pb_array_new(n * n, sizeof *d->v);
+  d->size = malloc(n * sizeof *d->size);
+  if (d->a && d->v && d->size) return d;
+  diagonal_free(d);
+  return NULL;
+}
 
 static void group_clear(group_system *g) {
   free(g->a);
-  free(g->v);
   free(g->b);
   free(g->c);
-  free(g->size);
+  diagonal_free(g->own);
 }
 
 static pb_status group_new(const pb_modes *m, const size_t *mode, size_t count, group_system *g,
@@ -39,11 +66,9 @@ static pb_status group_new(const pb_modes *m, const size_t *mode, size_t count, 
                       .nu = m->nu + 2 * m->stacked,
                       .ny = m->ny + 2 * m->stacked};
   g->a = pb_array_zero(n * n, sizeof(double));
-  g->v = pb_array_new(n * n, sizeof(double));
   g->b = pb_array_zero(n * g->nu, sizeof(double));
   g->c = pb_array_zero(n * g->ny, sizeof(double));
-  g->size = malloc(n * sizeof *g->size);
-  if (g->a && g->v && g->b && g->c && g->size) return PB_OK;
+  if (g->a && g->b && g->c) return PB_OK;
   group_clear(g);
   return pb_fail_memory(err, "");
 }
@@ -83,42 +108,56 @@ static void group_fill(const pb_modes *m, group_system *g) {
   }
 }
 
-// b ← V⁻¹ b, c ← c V, a ← diag(blocks).
-static pb_status group_diagonalize(group_system *g, pb_error *err) {
-  if (g->modes == 1) {
-    g->blocks = 1;
-    g->size[0] = 2;
-    return PB_OK;
-  }
-  pb_status st = pb_block_diagonalize(g->n, g->a, g->v, &g->blocks, g->size, "", err);
+static pb_status find_or_diagonalize(group_system *g, const pb_means *means, pb_error *err) {
+  const pb_mode_key key = {.first = g->a, .first_count = g->n * g->n};
+  g->d = pb_mode_store_find(means->modes, PB_MODES_DENSE, &key);
+  if (g->d) return PB_OK;
+  diagonal *d = g->own = diagonal_new(g->n);
+  if (!d) return pb_fail_memory(err, "");
+  memcpy(d->a, g->a, g->n * g->n * sizeof *d->a);
+  pb_status st = pb_block_diagonalize(g->n, d->a, d->v, &d->blocks, d->size, "", err);
   if (st) return st;
-  int n = (int)g->n, nu = (int)g->nu, ny = (int)g->ny, info = 0;
-  double one = 1, zero = 0;
-  double *c = pb_array_new(g->n * g->ny, sizeof *c);
+  g->d = pb_mode_store_keep(means->modes, PB_MODES_DENSE, &key, d, diagonal_free);
+  if (g->d)
+    g->own = NULL;
+  else
+    g->d = d;
+  return PB_OK;
+}
+
+// b ← V⁻¹ b, c ← c V.
+static pb_status group_transform(group_system *g, const pb_workers *workers, pb_error *err) {
+  int n = (int)g->n, nu = (int)g->nu, info = 0;
+  double *c = pb_array_new(g->n * g->ny, sizeof *c), *v = pb_array_new(g->n * g->n, sizeof *v);
   int *pivot = malloc(g->n * sizeof *pivot);
-  if (!c || !pivot) {
+  if (!c || !v || !pivot) {
     free(c);
+    free(v);
     free(pivot);
     return pb_fail_memory(err, "");
   }
-  dgemm_("N", "N", &ny, &n, &n, &one, g->c, &ny, g->v, &n, &zero, c, &ny);
+  const pb_product product = {"N", "N", g->ny, g->n, g->n, g->c, g->d->v, g->ny, g->n, 0, c, g->ny};
+  pb_product_make(&product, workers);
   free(g->c);
   g->c = c;
-  dgesv_(&n, &nu, g->v, &n, pivot, g->b, &n, &info);
+  memcpy(v, g->d->v, g->n * g->n * sizeof *v);
+  dgesv_(&n, &nu, v, &n, pivot, g->b, &n, &info);
+  free(v);
   free(pivot);
   if (info) return pb_fail(err, PB_ERR_NUMERIC, "", "the modal transformation is singular");
   return PB_OK;
 }
 
 // Hands the group's blocks over; a real eigenvalue shares a 2 × 2 block with the next one.
-static pb_status group_emit(const group_system *g, pb_model_builder *builder, pb_error *err) {
+static pb_status group_emit(const group_system *g, const diagonal *d, pb_model_builder *builder,
+                            pb_error *err) {
   pb_status st = PB_OK;
   size_t at = 0;
-  for (size_t k = 0; k < g->blocks && !st; k++) {
-    size_t size = g->size[k];
-    if (size == 1 && k + 1 < g->blocks && g->size[k + 1] == 1) size = 2, k++;
+  for (size_t k = 0; k < d->blocks && !st; k++) {
+    size_t size = d->size[k];
+    if (size == 1 && k + 1 < d->blocks && d->size[k + 1] == 1) size = 2, k++;
     pb_model_part part = {.size = size,
-                          .a = g->a + at + at * g->n,
+                          .a = d->a + at + at * g->n,
                           .lda = g->n,
                           .b = g->b + at,
                           .ldb = g->n,
@@ -131,21 +170,30 @@ static pb_status group_emit(const group_system *g, pb_model_builder *builder, pb
 }
 
 static pb_status build_dense(const pb_modes *m, const size_t *mode, size_t count,
-                             pb_model_builder *builder, pb_error *err) {
+                             const pb_means *means, pb_model_builder *builder, pb_error *err) {
   group_system g;
   pb_status st = group_new(m, mode, count, &g, err);
   if (st) return st;
   group_fill(m, &g);
-  st = group_diagonalize(&g, err);
-  if (!st) st = group_emit(&g, builder, err);
+  if (count == 1) {
+    size_t size = 2;
+    const diagonal whole = {.a = g.a, .size = &size, .blocks = 1};
+    st = group_emit(&g, &whole, builder, err);
+  } else {
+    st = find_or_diagonalize(&g, means, err);
+    if (!st) st = group_transform(&g, means->workers, err);
+    if (!st) st = group_emit(&g, g.d, builder, err);
+  }
   group_clear(&g);
   return st;
 }
 
-pb_status pb_group_build(const pb_modes *m, const size_t *mode, size_t count,
+pb_status pb_group_build(const pb_modes *m, const size_t *mode, size_t count, const pb_means *lent,
                          pb_model_builder *builder, pb_error *err) {
+  const pb_means means = pb_means_of(lent);
   bool done = false;
-  pb_status st = count > 1 ? pb_group_build_damped(m, mode, count, builder, &done, err) : PB_OK;
+  pb_status st =
+      count > 1 ? pb_group_build_damped(m, mode, count, &means, builder, &done, err) : PB_OK;
   if (st || done) return st;
-  return build_dense(m, mode, count, builder, err);
+  return build_dense(m, mode, count, &means, builder, err);
 }

@@ -11,11 +11,12 @@
 // Appends the blocks of the modes mode[count] to the builder. Fails with PB_ERR_NUMERIC,
 // PB_ERR_MEMORY. [init]
 pb_status pb_group_build(const pb_modes *modes, const size_t *mode, size_t count,
-                         pb_model_builder *builder, pb_error *err);
+                         const pb_means *means, pb_model_builder *builder, pb_error *err);
 
 // The same by the method for weakly coupled modes. *done false, and nothing appended: it does not
 // serve here.
 pb_status pb_group_build_damped(const pb_modes *modes, const size_t *mode, size_t count,
-                                pb_model_builder *builder, bool *done, pb_error *err);
+                                const pb_means *means, pb_model_builder *builder, bool *done,
+                                pb_error *err);
 
 #endif

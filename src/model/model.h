@@ -19,10 +19,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "base/phase.h"
 #include "base/status.h"
 #include "model/electronics.h"
 
+struct pb_means;  // means.h
 struct pb_system;
 struct pb_step_pack;
 
@@ -78,14 +78,14 @@ pb_status pb_model_compile(const struct pb_system *system, pb_warnings *warnings
 // Loads, assembles and compiles a plant file in one call. [init]
 pb_status pb_model_load(const char *path, pb_warnings *warnings, pb_model **out, pb_error *err);
 
-// The same with an observer (may be NULL) told as each phase begins. A system that tells how
+// The same with what the caller lends (may be NULL). A system that tells how
 // stacked coordinates follow (system.h) gets each of them as two more outputs (all q_i, then all
 // q̇_i) and two more inputs (a displacement of each in the metric of M: f = M q sets η = Φᵀf at
 // once; then an impulse on each), after the plant's own; their columns of D stay zero. [init]
-pb_status pb_model_compile_observed(const struct pb_system *system, const pb_observer *observer,
-                                    pb_warnings *warnings, pb_model **out, pb_error *err);
-pb_status pb_model_load_observed(const char *path, const pb_observer *observer,
-                                 pb_warnings *warnings, pb_model **out, pb_error *err);
+pb_status pb_model_compile_with(const struct pb_system *system, const struct pb_means *means,
+                                pb_warnings *warnings, pb_model **out, pb_error *err);
+pb_status pb_model_load_with(const char *path, const struct pb_means *means, pb_warnings *warnings,
+                             pb_model **out, pb_error *err);
 
 void pb_model_free(pb_model *model);
 

@@ -5,6 +5,7 @@
 #define PB_MODEL_MODES_H
 
 #include "assembly/system.h"
+#include "model/means.h"
 
 typedef struct pb_modes {
   size_t n, nu, ny;
@@ -20,8 +21,8 @@ typedef struct pb_modes {
 // Solves for the modes. Warns of rigid-body modes. Fails with PB_ERR_NUMERIC, PB_ERR_MEMORY and,
 // where a mode's stiffness is negative beyond rounding, PB_ERR_SINGULAR naming its frequency.
 // [init]
-pb_status pb_modes_solve(const pb_system *system, pb_warnings *warnings, pb_modes *out,
-                         pb_error *err);
+pb_status pb_modes_solve(const pb_system *system, const pb_means *means, pb_warnings *warnings,
+                         pb_modes *out, pb_error *err);
 void pb_modes_clear(pb_modes *modes);
 
 #endif

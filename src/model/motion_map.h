@@ -12,6 +12,7 @@
 #define PB_MODEL_MOTION_MAP_H
 
 #include "assembly/motion.h"
+#include "model/means.h"
 #include "model/model.h"
 
 // Larger plants are compiled without a map: they cannot be changed while they run.
@@ -23,9 +24,11 @@ typedef struct pb_motion_map {
   size_t n, nx, nu;  // coordinates; states and inputs of the model
   double *m, *k;     // n × n: stacked mass and stiffness
   double *f;         // n × nu: forces of the inputs on the coordinates
-  double *cq, *cv;   // n × nx
   double *dq;        // n × nu
-  double *bq, *bv;   // nx × n
+  double *b, *c;     // with the plant's own inputs and outputs: what the four below are part of
+  const double *cq, *cv;  // n × nx, leading dimension ldc
+  const double *bq, *bv;  // nx × n
+  size_t ldc;
 } pb_motion_map;
 
 // Reads a plant file's text (element paths relative to directory), assembles and compiles it, with
@@ -36,12 +39,10 @@ pb_status pb_model_parse(const char *text, size_t length, const char *directory,
                          pb_warnings *warnings, pb_model **out, pb_motion_map **map,
                          char **canonical, pb_error *err);
 
-// The same with the elements of a store (element_store.h; NULL: none) and an observer (NULL: none)
-// told as each phase begins. [init]
-pb_status pb_model_parse_stored(const char *text, size_t length, const char *directory,
-                                pb_element_store *store, const pb_observer *observer,
-                                pb_warnings *warnings, pb_model **out, pb_motion_map **map,
-                                char **canonical, pb_error *err);
+// The same with what the caller lends (may be NULL). [init]
+pb_status pb_model_parse_with(const char *text, size_t length, const char *directory,
+                              const pb_means *means, pb_warnings *warnings, pb_model **out,
+                              pb_motion_map **map, char **canonical, pb_error *err);
 
 void pb_motion_map_free(pb_motion_map *map);  // NULL is allowed
 

@@ -7,6 +7,7 @@
 
 #include "base/array.h"
 #include "base/lapack.h"
+#include "base/product.h"
 #include "model/electronics.h"
 
 // c = a b + beta c; a is m × k, b k × n.
@@ -30,24 +31,57 @@ static range nonzeros(const double *column, size_t rows) {
 
 // c = a s where s (k × n) is nearly block diagonal, as what belongs to components is: columns whose
 // entries share rows with those before are a block, a product of its own.
-static void multiply_blocks(size_t m, size_t n, size_t k, const double *a, const double *s,
-                            double *c) {
+typedef struct blocks {
+  size_t m, k;
+  const double *a, *s;
+  double *c;
+  size_t *column;  // [count + 1] where each begins
+  range *rows;     // [count]
+  size_t count;
+} blocks;
+
+static void blocks_find(blocks *b, size_t n) {
   for (size_t j = 0, next; j < n; j = next) {
-    range block = nonzeros(s + j * k, k);
+    range rows = nonzeros(b->s + j * b->k, b->k);
     for (next = j + 1; next < n; next++) {
-      const range r = nonzeros(s + next * k, k);
-      if (r.first >= block.end || r.end <= block.first) break;
-      if (r.first < block.first) block.first = r.first;
-      if (r.end > block.end) block.end = r.end;
+      const range r = nonzeros(b->s + next * b->k, b->k);
+      if (r.first >= rows.end || r.end <= rows.first) break;
+      if (r.first < rows.first) rows.first = r.first;
+      if (r.end > rows.end) rows.end = r.end;
     }
-    const int im = (int)m, in = (int)(next - j), ik = (int)(block.end - block.first), ld = (int)k;
-    const double one = 1.0, zero = 0.0;
-    if (ik)
-      dgemm_("N", "N", &im, &in, &ik, &one, a + block.first * m, &im, s + block.first + j * k, &ld,
-             &zero, c + j * m, &im);
-    else
-      memset(c + j * m, 0, m * (next - j) * sizeof *c);
+    b->column[b->count] = j;
+    b->rows[b->count++] = rows;
   }
+  b->column[b->count] = n;
+}
+
+static void blocks_multiply(void *context, size_t item, size_t worker) {
+  (void)worker;
+  const blocks *b = context;
+  const size_t first = b->column[item], columns = b->column[item + 1] - first, m = b->m;
+  const range rows = b->rows[item];
+  if (rows.end > rows.first)
+    pb_product_make(&(pb_product){"N", "N", m, columns, rows.end - rows.first,
+                                  b->a + rows.first * m, b->s + rows.first + first * b->k, m, b->k,
+                                  0, b->c + first * m, m},
+                    NULL);
+  else
+    memset(b->c + first * m, 0, m * columns * sizeof *b->c);
+}
+
+static pb_status multiply_blocks(size_t m, size_t n, size_t k, const double *a, const double *s,
+                                 double *c, const pb_workers *workers, pb_error *err) {
+  blocks b = {.m = m, .k = k, .a = a, .s = s, .c = c};
+  b.column = malloc((n + 1) * sizeof *b.column);
+  b.rows = malloc((n + 1) * sizeof *b.rows);
+  const bool ok = b.column && b.rows;
+  if (ok) {
+    blocks_find(&b, n);
+    pb_workers_run(workers, b.count, blocks_multiply, &b);
+  }
+  free(b.column);
+  free(b.rows);
+  return ok ? PB_OK : pb_fail_memory(err, "transfer");
 }
 
 // Work space of the preparation; nq old, nr new coordinates.
@@ -69,11 +103,36 @@ static void work_clear(work *w) {
   free(w->force);
 }
 
-// X += (B M' L) C, leaving B M' L in the work space.
-static void add_part(const pb_transfer *t, work *w, const double *b, const double *c) {
+// X = beta X + (B M' L) C, leaving B M' L in the work space.
+static pb_status add_part(const pb_transfer *t, work *w, const double *b, const double *c,
+                          double beta, const pb_workers *workers, pb_error *err) {
   const pb_motion_map *from = t->from_map, *to = t->to_map;
-  multiply_blocks(to->nx, from->n, to->n, b, w->ml, w->bml);
-  multiply(to->nx, from->nx, from->n, 1.0, w->bml, c, 1.0, t->x);
+  pb_status st = multiply_blocks(to->nx, from->n, to->n, b, w->ml, w->bml, workers, err);
+  const pb_product product = {"N", "N",    to->nx,    from->nx, from->n, w->bml,
+                              c,   to->nx, from->ldc, beta,     t->x,    to->nx};
+  if (!st) pb_product_make(&product, workers);
+  return st;
+}
+
+static bool is_identity(const double *a, size_t n) {
+  for (size_t j = 0; j < n; j++)
+    for (size_t i = 0; i < n; i++)
+      if (a[i + j * n] != (i == j ? 1.0 : 0.0)) return false;
+  return true;
+}
+
+// Only signals differ: then the modes have the bits that they had (mode_store.h, or by solving the
+// same equations anew), and B_q M C_q + B_v M C_v = I need not be computed.
+static bool same_motion(const pb_motion_map *a, const pb_motion_map *b, const double *l) {
+  const size_t square = a->n * a->n * sizeof(double), rows = a->n * sizeof(double);
+  if (a->n != b->n || a->nx != b->nx || memcmp(a->m, b->m, square) != 0) return false;
+  if (memcmp(a->bq, b->bq, a->nx * rows) != 0 || memcmp(a->bv, b->bv, a->nx * rows) != 0)
+    return false;
+  for (size_t j = 0; j < a->nx; j++)
+    if (memcmp(a->cq + j * a->ldc, b->cq + j * b->ldc, rows) != 0 ||
+        memcmp(a->cv + j * a->ldc, b->cv + j * b->ldc, rows) != 0)
+      return false;
+  return is_identity(l, a->n);
 }
 
 // What inputs hold statically, without states or inside what is new: U = B_q M' (L D_q − D_q' +
@@ -91,7 +150,12 @@ static void add_static(const pb_transfer *t, work *w) {
   multiply(to->nx, from->nu, to->n, -1.0, to->bq, w->force, 1.0, t->u);
 }
 
-static pb_status matrices_make(pb_transfer *t, pb_error *err) {
+static pb_status x_new(pb_transfer *t, pb_error *err) {
+  t->x = pb_array_new(t->to->nx * t->from->nx, sizeof *t->x);
+  return t->x ? PB_OK : pb_fail_memory(err, "transfer");
+}
+
+static pb_status matrices_make(pb_transfer *t, const pb_workers *workers, pb_error *err) {
   const pb_motion_map *from = t->from_map, *to = t->to_map;
   work w = {0};
   pb_status st = pb_transfer_coordinates(from, to, &w.l, &w.lu, err);
@@ -100,24 +164,24 @@ static pb_status matrices_make(pb_transfer *t, pb_error *err) {
   w.static_ = pb_array_zero(to->n * from->nu + 1, sizeof(double));
   w.force = pb_array_new(to->n * from->nu + 1, sizeof(double));
   if (!st && (!w.ml || !w.bml || !w.static_ || !w.force)) st = pb_fail_memory(err, "transfer");
-  if (!st) {
-    multiply_blocks(to->n, from->n, to->n, to->m, w.l, w.ml);
-    add_part(t, &w, to->bv, from->cv);
-    add_part(t, &w, to->bq, from->cq);
-    add_static(t, &w);  // with what the displacements have left
-  }
+  if (!st) st = multiply_blocks(to->n, from->n, to->n, to->m, w.l, w.ml, workers, err);
+  const bool same = !st && same_motion(from, to, w.l);
+  if (!st && !same) st = x_new(t, err);
+  if (!st && !same) st = add_part(t, &w, to->bv, from->cv, 0, workers, err);
+  if (!st && !same) st = add_part(t, &w, to->bq, from->cq, 1, workers, err);
+  if (same) st = multiply_blocks(to->nx, from->n, to->n, to->bq, w.ml, w.bml, workers, err);
+  if (!st) add_static(t, &w);  // with what the displacements have left
   work_clear(&w);
   return st;
 }
 
 static pb_status allocate(pb_transfer *t, pb_error *err) {
-  t->x = pb_array_zero(t->to->nx * t->from->nx, sizeof *t->x);
   t->u = pb_array_zero(t->to->nx * t->from->nu, sizeof *t->u);
   t->input_from = calloc(t->to->nu, sizeof *t->input_from);
   t->output_from = calloc(t->to->ny, sizeof *t->output_from);
   t->before = pb_state_new(t->from);
   t->after = pb_state_new(t->to);
-  if (!t->x || !t->u || !t->input_from || !t->output_from || !t->before || !t->after)
+  if (!t->u || !t->input_from || !t->output_from || !t->before || !t->after)
     return pb_fail_memory(err, "transfer");
   for (size_t i = 0; i < t->to->nu; i++)
     t->input_from[i] = pb_model_input(t->from, t->to->input[i].name);
@@ -127,7 +191,8 @@ static pb_status allocate(pb_transfer *t, pb_error *err) {
 }
 
 pb_status pb_transfer_new(const pb_model *from, const pb_motion_map *from_map, const pb_model *to,
-                          const pb_motion_map *to_map, pb_transfer **out, pb_error *err) {
+                          const pb_motion_map *to_map, const pb_workers *workers, pb_transfer **out,
+                          pb_error *err) {
   *out = NULL;
   if (!from_map || !to_map)
     return pb_fail(err, PB_ERR_STATE, "/components",
@@ -141,7 +206,7 @@ pb_status pb_transfer_new(const pb_model *from, const pb_motion_map *from_map, c
   t->from_map = from_map;
   t->to_map = to_map;
   pb_status st = allocate(t, err);
-  if (!st) st = matrices_make(t, err);
+  if (!st) st = matrices_make(t, workers, err);
   if (st)
     pb_transfer_free(t);
   else
@@ -169,8 +234,12 @@ void pb_transfer_apply(pb_transfer *t, const pb_state *before, pb_state *after) 
   const size_t nx = t->from->nx, mx = t->to->nx;
   memcpy(t->before, before, pb_state_bytes(t->from));
   pb_electronics_carry(t->from, before, t->input_from, t->output_from, t->to, after);
-  memset(after->data, 0, mx * sizeof *after->data);
-  add_columns(mx, nx, t->x, before->data, after->data);
+  if (t->x) {
+    memset(after->data, 0, mx * sizeof *after->data);
+    add_columns(mx, nx, t->x, before->data, after->data);
+  } else {
+    memcpy(after->data, before->data, mx * sizeof *after->data);
+  }
   add_columns(mx, t->from->nu, t->u, before->data + nx, after->data);
   after->step = before->step;
   pb_state_measure(t->to, after);

@@ -13,7 +13,7 @@
 typedef struct pb_transfer {
   const pb_model *from, *to;
   const pb_motion_map *from_map, *to_map;
-  double *x;         // to->nx × from->nx
+  double *x;         // to->nx × from->nx; NULL: the identity, as what moves is the same
   double *u;         // to->nx × from->nu
   int *input_from;   // [to->nu] the old input of that name; −1: none
   int *output_from;  // [to->ny]
@@ -29,10 +29,11 @@ typedef struct pb_transfer_report {
                        // adds up from, as volts and metres do not compare; −1: none in common
 } pb_transfer_report;
 
-// Prepares the transfer between two compiled plants, which must outlive it. PB_ERR_STATE when one
-// of them has no map. [init]
+// Prepares the transfer between two compiled plants, which must outlive it; workers: threads to
+// share it with, NULL: none. PB_ERR_STATE when one of the plants has no map. [init]
 pb_status pb_transfer_new(const pb_model *from, const pb_motion_map *from_map, const pb_model *to,
-                          const pb_motion_map *to_map, pb_transfer **out, pb_error *err);
+                          const pb_motion_map *to_map, const pb_workers *workers, pb_transfer **out,
+                          pb_error *err);
 void pb_transfer_free(pb_transfer *transfer);  // NULL is allowed
 
 // Fills `after`, a state of the new model, from `before`: motion, held inputs by name, the step.

@@ -286,7 +286,7 @@ static void what_is_wrong_is_refused(void **state) {
 static pb_transfer_report carry(side *from, side *to) {
   pb_transfer *t = NULL;
   pb_transfer_report report;
-  REQUIRE(pb_transfer_new(from->model, from->map, to->model, to->map, &t, &err));
+  REQUIRE(pb_transfer_new(from->model, from->map, to->model, to->map, NULL, &t, &err));
   pb_transfer_apply(t, from->state, to->state);
   REQUIRE(pb_transfer_examine(t, &report, &err));
   pb_transfer_free(t);

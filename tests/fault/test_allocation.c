@@ -233,7 +233,7 @@ static pb_status transfer(const char *path, pb_error *err) {
   pb_status st = pb_text_read(path, &text, &length, err);
   if (!st) st = pb_model_parse(text, length, NULL, NULL, &from, &from_map, &canonical, err);
   if (!st) st = pb_model_parse(text, length, NULL, NULL, &to, &to_map, NULL, err);
-  if (!st) st = pb_transfer_new(from, from_map, to, to_map, &way, err);
+  if (!st) st = pb_transfer_new(from, from_map, to, to_map, NULL, &way, err);
   if (!st) st = pb_transfer_examine(way, &report, err);
   pb_transfer_free(way);
   pb_motion_map_free(from_map);

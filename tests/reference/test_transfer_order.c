@@ -64,7 +64,7 @@ static void carry(const side *a, side *b, double displacement, double voltage) {
   pb_transfer_report r;
   double ya[64], yb[64];
   pb_error err = {PB_OK, "", ""};
-  if (pb_transfer_new(a->model, a->map, b->model, b->map, &t, &err)) fail_msg("%s", err.message);
+  if (pb_transfer_new(a->model, a->map, b->model, b->map, NULL, &t, &err)) fail_msg("%s", err.message);
   pb_transfer_apply(t, a->state, b->state);
   assert_int_equal(pb_transfer_examine(t, &r, &err), PB_OK);
   pb_step_output(a->model, a->state, ya);

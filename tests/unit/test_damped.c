@@ -98,7 +98,7 @@ static size_t dense_eigenvalues(const problem *p, double complex *out) {
 static void check(const problem *p, bool expect_solved) {
   pb_damped d;
   bool solved;
-  REQUIRE(pb_damped_solve(p->n, p->omega, p->damping, &d, &solved, &err));
+  REQUIRE(pb_damped_solve(p->n, p->omega, p->damping, NULL, &d, &solved, &err));
   assert_int_equal(solved, expect_solved);
   if (!solved) {
     assert_null(d.x[0]);

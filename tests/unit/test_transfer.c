@@ -91,7 +91,7 @@ static pb_transfer_report carry(side *from, side *to) {
   pb_transfer *t = NULL;
   pb_transfer_report report;
   pb_error err = {PB_OK, "", ""};
-  if (pb_transfer_new(from->model, from->map, to->model, to->map, &t, &err))
+  if (pb_transfer_new(from->model, from->map, to->model, to->map, NULL, &t, &err))
     fail_msg("%s: %s", err.where, err.message);
   watching = true;
   pb_transfer_apply(t, from->state, to->state);
@@ -135,6 +135,21 @@ static void the_same_plant_goes_on_as_it_was(void **state) {
 
 // Stiffness, payload, damping: neither displacements nor velocities jump. Velocities are seen by
 // stepping on: the gain of displacement in the next step.
+// Forces and volts by another factor: the modes are the same ones, and so is every state.
+static void gains_change_and_no_state_does(void **state) {
+  (void)state;
+  side a = side_patched("nano-hexapod", "{}");
+  side b = side_patched("nano-hexapod", "{\"models\":{\"apa300ml\":{\"g_a\":1.3,\"g_s\":1e5}}}");
+  shake(&a, 700);
+  const pb_transfer_report r = carry(&a, &b);
+  assert_memory_equal(a.state->data, b.state->data, a.model->nx * sizeof(double));
+  assert_true(r.energy_before > 0.0);
+  assert_true(fabs(r.energy_after / r.energy_before - 1.0) < 1e-12);
+  assert_true(jump(&a, &b, "dL") < 1e-12);
+  side_free(&a);
+  side_free(&b);
+}
+
 static void parameters_change_and_motion_does_not(void **state) {
   (void)state;
   static const char *const patches[] = {
@@ -272,6 +287,7 @@ static void held_inputs_follow_their_names(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(the_same_plant_goes_on_as_it_was),
+      cmocka_unit_test(gains_change_and_no_state_does),
       cmocka_unit_test(parameters_change_and_motion_does_not),
       cmocka_unit_test(a_payload_comes_and_goes),
       cmocka_unit_test(actuators_of_another_kind_keep_the_platform_still),
