@@ -1,1 +1,1 @@
-pb_bench(compile SOURCES bench_compile.c plants.c LIBS LAPACK::LAPACK)
+pb_bench(compile SOURCES bench_compile.c plants.c LIBS plantbus_stepping LAPACK::LAPACK)

@@ -24,5 +24,7 @@ static void panel(void *context, size_t item, size_t worker) {
 void pb_product_make(const pb_product *product, const pb_workers *workers) {
   if (product->m == 0) return;
   const size_t wide = pb_product_panel(product->n);
-  pb_workers_run(workers, (product->n + wide - 1) / wide, panel, (void *)product);
+  const double operations = 2.0 * (double)product->m * (double)product->n * (double)product->k;
+  pb_workers_run(pb_workers_for(workers, operations), (product->n + wide - 1) / wide, panel,
+                 (void *)product);
 }

@@ -19,6 +19,11 @@ static inline size_t pb_workers_count(const pb_workers *workers) {
   return workers && workers->count > 1 ? workers->count : 1;
 }
 
+// The workers, or NULL where so few operations are done sooner than others are woken. [any]
+static inline const pb_workers *pb_workers_for(const pb_workers *workers, double operations) {
+  return operations >= 2e7 ? workers : NULL;
+}
+
 // In the caller's thread, one after the other, without workers (NULL).
 static inline void pb_workers_run(const pb_workers *workers, size_t items, pb_work work,
                                   void *context) {

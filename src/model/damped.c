@@ -242,6 +242,7 @@ pb_status pb_damped_solve(size_t n, const double *omega, const double *damping,
   pb_status st = pb_clusters_make(n, omega, damping, &out->cluster, solved, err);
   if (st || !*solved) return st;
   out->columns = out->cluster.column[out->cluster.count];
+  workers = pb_workers_for(workers, 4.0 * (double)n * (double)n * (double)out->columns);
   if (!result_new(out) || !iteration_new(out, workers, &it)) st = pb_fail_memory(err, "");
   if (!st) {
     begin(omega, damping, &it);

@@ -295,6 +295,9 @@ static void make_panel(void *context, size_t panel, size_t worker) {
 
 pb_status pb_group_shapes_fill(const pb_group_shapes *shapes, const pb_workers *workers,
                                pb_model *model, bool *sound, pb_error *err) {
+  const pb_damped *d = shapes->d;
+  workers = pb_workers_for(workers, 4.0 * (double)d->n * (double)d->columns *
+                                        (double)(model->nu + model->ny));
   const size_t count = pb_workers_count(workers);
   work w = {.g = shapes, .model = model, .nu = model->nu, .ny = model->ny};
   bool ok = gather_all(&w) && panels_make(&w);

@@ -186,6 +186,7 @@ static pb_status polish(const pb_system *s, const pb_workers *workers, double *o
   work.product = pb_array_new(n * slow + 1, sizeof *work.product);
   work.along = pb_array_new(n * slow + 1, sizeof *work.along);
   bool ok = stiffness && t && old && among && work.product && work.along;
+  workers = pb_workers_for(workers, 4.0 * (double)slow * (double)n * (double)n);
   if (ok) {
     orthonormalize_slow(s, shape, slow, &work, workers);
     make_stiffness(s, shape, slow, omega2, stiffness, space, &work, workers);

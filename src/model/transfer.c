@@ -55,6 +55,13 @@ static void blocks_find(blocks *b, size_t n) {
   b->column[b->count] = n;
 }
 
+static double operations(const blocks *b) {
+  double sum = 0;
+  for (size_t i = 0; i < b->count; i++)
+    sum += (double)((b->column[i + 1] - b->column[i]) * (b->rows[i].end - b->rows[i].first));
+  return 2 * (double)b->m * sum;
+}
+
 static void blocks_multiply(void *context, size_t item, size_t worker) {
   (void)worker;
   const blocks *b = context;
@@ -77,7 +84,7 @@ static pb_status multiply_blocks(size_t m, size_t n, size_t k, const double *a, 
   const bool ok = b.column && b.rows;
   if (ok) {
     blocks_find(&b, n);
-    pb_workers_run(workers, b.count, blocks_multiply, &b);
+    pb_workers_run(pb_workers_for(workers, operations(&b)), b.count, blocks_multiply, &b);
   }
   free(b.column);
   free(b.rows);
