@@ -33,9 +33,19 @@ static void *pool_thread(void *context) {
   return NULL;
 }
 
+// With the first work: what is small never asks for them, and need not wait for their end.
+static void threads_start(pb_pool *pool) {
+  while (pool->threads + 1 < pool->workers.count) {
+    if (pthread_create(&pool->thread[pool->threads], NULL, pool_thread, pool) != 0) break;
+    pthread_setname_np(pool->thread[pool->threads++], "pb-compile");
+  }
+  pool->workers.count = pool->threads + 1;
+}
+
 // A thread that wakes when all is done finds no item, and nothing of the context is touched.
 static void pool_run(void *whose, size_t items, pb_work work, void *context) {
   pb_pool *pool = whose;
+  if (pool->turn == 0) threads_start(pool);
   pthread_mutex_lock(&pool->lock);
   pool->work = work;
   pool->context = context;
@@ -60,11 +70,7 @@ void pb_pool_open(pb_pool *pool) {
   pthread_mutex_init(&pool->lock, NULL);
   pthread_cond_init(&pool->begun, NULL);
   pthread_cond_init(&pool->ended, NULL);
-  for (size_t wanted = processors(); pool->threads + 1 < wanted; pool->threads++) {
-    if (pthread_create(&pool->thread[pool->threads], NULL, pool_thread, pool) != 0) break;
-    pthread_setname_np(pool->thread[pool->threads], "pb-compile");
-  }
-  pool->workers = (pb_workers){.count = pool->threads + 1, .run = pool_run, .pool = pool};
+  pool->workers = (pb_workers){.count = processors(), .run = pool_run, .pool = pool};
 }
 
 void pb_pool_close(pb_pool *pool) {

@@ -10,7 +10,7 @@
 enum { PB_POOL_MOST = 4 };  // what a model is made of does not share well among more
 
 typedef struct pb_pool {
-  pb_workers workers;  // of as many threads as could be had, the one that calls `run` among them
+  pb_workers workers;  // of a thread for each processor, the one that calls `run` among them
   pthread_mutex_t lock;
   pthread_cond_t begun, ended;
   pthread_t thread[PB_POOL_MOST];
@@ -22,8 +22,8 @@ typedef struct pb_pool {
   size_t items, next, busy;  // next item that nobody has; threads that may still be at one
 } pb_pool;
 
-// Starts threads, one for each processor that this thread may use, with its scheduling; one thread
-// at a time calls `run`. `pool` stays where it is until it is closed.
+// A thread for each processor that this one may use, with its scheduling; started when `run` first
+// has work for them, by the one thread that may call it. `pool` stays where it is until it is closed.
 void pb_pool_open(pb_pool *pool);
 void pb_pool_close(pb_pool *pool);
 
