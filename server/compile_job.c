@@ -38,8 +38,11 @@ static pb_status compile(pb_compile_job *job, const pb_workers *workers) {
   if (status) return status;
   job->state = pb_state_new(job->next->model);
   if (!job->state) return pb_fail_memory(&job->err, "state");
-  return pb_transfer_new(job->before->model, job->before->map, job->next->model, job->next->map,
-                         workers, &job->transfer, &job->err);
+  status = pb_transfer_new(job->before->model, job->before->map, job->next->model, job->next->map,
+                           workers, &job->transfer, &job->err);
+  const size_t ahead = status ? 0 : pb_carrier_steps(job->transfer, job->rate);
+  if (ahead) status = pb_handover_new(job->transfer, ahead, workers, &job->handover, &job->err);
+  return status;
 }
 
 // At a lower priority than what steps and serves: on Linux a thread has a nice value of its own,
@@ -76,6 +79,7 @@ void pb_compile_clear(pb_compile_job *job) {
   pb_warnings_clear(&job->warnings);
   pb_warnings_clear(&job->notes);
   pb_revision_free(job->next);
+  pb_handover_free(job->handover);
   pb_transfer_free(job->transfer);
   free(job->state);
   free(job->text);

@@ -15,6 +15,7 @@ static const int64_t answer_ns = 800000000;  // each request is answered within 
 
 static void pending_clear(pb_pending *p) {
   // Before a change the pointers hold what it brings, after it what it replaced.
+  pb_carrier_end(&p->carrier);
   pb_host_free(p->change.swaps_host ? p->change.host : NULL);
   if (p->change.model) free(p->change.state);
   pb_compile_clear(&p->job);
@@ -43,6 +44,13 @@ static void compile_finished(void *context) {
   dds_set_guardcondition(d->wake, true);
 }
 
+static double step_rate(pb_daemon *d) {
+  pthread_mutex_lock(&d->lock);
+  const bool realtime = d->engine.drive == PB_DRIVE_REALTIME;
+  pthread_mutex_unlock(&d->lock);
+  return realtime ? pb_daemon_live(d)->model->sample_rate * d->speed : 0.0;
+}
+
 // Takes over text, patch and comment, also on failure.
 pb_status pb_configure_begin(pb_daemon *d, pb_request *request, const pb_configure_order *order,
                              pb_error *err) {
@@ -59,6 +67,7 @@ pb_status pb_configure_begin(pb_daemon *d, pb_request *request, const pb_configu
                             .elements = &d->elements,
                             .modes = &d->modes,
                             .number = d->revisions_made + 1,
+                            .rate = step_rate(d),
                             .finished = compile_finished,
                             .context = d};
   pb_status status = pb_compile_start(&p->job, err);
@@ -122,6 +131,10 @@ static pb_status model_arm(pb_daemon *d, pb_error *err) {
   change->state = job->state;
   job->state = NULL;
   p->host_next = change->host;
+  if (job->handover && pb_carrier_start(&p->carrier, job->handover)) {
+    job->handover = NULL;
+    change->carrier = &p->carrier;
+  }
   arm(d);
   return PB_OK;
 }

@@ -29,6 +29,8 @@ typedef struct pb_compile_job {
   pb_revision *next;
   pb_state *state;
   pb_transfer *transfer;
+  pb_handover *handover;  // of the transfer, where it is to be spread; until a carrier takes it
+  double rate;            // steps a second by the wall clock; 0: lockstep
   pb_warnings warnings, notes;
   pb_status status;
   pb_error err;
@@ -67,7 +69,8 @@ typedef struct pb_pending {
   uint64_t host_period;
   const pb_host *host_next;  // the hosted items once the change is made
   pb_change change;          // under lock, or the step thread's, once armed
-  bool armed, made;          // under lock
+  pb_carrier carrier;
+  bool armed, made;  // under lock
 } pb_pending;
 
 // One line of the history; the text of each revision is kept for `revert`.

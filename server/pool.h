@@ -23,7 +23,8 @@ typedef struct pb_pool {
 } pb_pool;
 
 // A thread for each processor that this one may use, with its scheduling; started when `run` first
-// has work for them, by the one thread that may call it. `pool` stays where it is until it is closed.
+// has work for them, by the one thread that may call it. `pool` stays where it is until it is
+// closed.
 void pb_pool_open(pb_pool *pool);
 void pb_pool_close(pb_pool *pool);
 

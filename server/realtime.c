@@ -37,6 +37,9 @@ typedef struct step_run {
   int64_t start;  // deadline 0
   uint64_t k;     // number of the next deadline
   double interval;
+  pb_change *spread;  // under way, in steps up to `due`; NULL: none
+  uint64_t due;
+  const pb_change *whole;  // came too late to be spread before its step
 } step_run;
 
 static void inputs_relayout(const int *from, size_t nu, double *u) {
@@ -77,11 +80,7 @@ static void scheduling_ask(pb_realtime *rt) {
   atomic_store(&rt->flush, pb_denormals_are_flushed());
 }
 
-static void change_make(pb_realtime *rt, step_run *run) {
-  pb_change *change = atomic_load_explicit(&rt->change, memory_order_acquire);
-  if (!change || rt->stepper->state->step < change->at_step) return;
-  // Taken out before it is made: it may be revoked up to here.
-  if (!atomic_compare_exchange_strong(&rt->change, &change, NULL)) return;
+static void change_make(pb_realtime *rt, step_run *run, pb_change *change) {
   if (change->model) {
     run->former_revision = rt->stepper->revision;
     memcpy(run->input_from, change->input_from, sizeof run->input_from);
@@ -93,10 +92,57 @@ static void change_make(pb_realtime *rt, step_run *run) {
   sem_post(&rt->published);
 }
 
+// Whether a change is to begin at this step: at its own, or as many steps ahead as it is spread
+// over, where there are so many. One that is to be made as soon as possible is made after them.
+static bool change_begins(const pb_realtime *rt, step_run *run, const pb_change *change,
+                          bool *spread) {
+  const uint64_t step = rt->stepper->state->step;
+  const uint64_t ahead = change->carrier ? change->carrier->handover->steps : 0;
+  if (step + ahead < change->at_step) return false;
+  if (step < change->at_step && step + ahead > change->at_step) run->whole = change;
+  *spread = ahead > 0 && run->whole != change;
+  return *spread || step >= change->at_step;
+}
+
+static void change_spread(pb_realtime *rt, step_run *run, pb_change *change) {
+  run->spread = change;
+  run->due = rt->stepper->state->step + change->carrier->handover->steps;
+  pb_handover_begin(change->carrier->handover, rt->stepper->state);
+  sem_post(&change->carrier->begun);
+}
+
+// A spread change that is not carried in time is made whole.
+static void spread_make(pb_realtime *rt, step_run *run) {
+  pb_change *change = run->spread;
+  const bool carried = rt->stepper->state->step == run->due &&
+                       atomic_load_explicit(&change->carrier->carried, memory_order_acquire);
+  run->spread = NULL;
+  change->handover = carried ? change->carrier->handover : NULL;
+  change_make(rt, run, change);
+}
+
+static void change_look(pb_realtime *rt, step_run *run) {
+  bool spread;
+  if (run->spread) {
+    if (rt->stepper->state->step >= run->due) spread_make(rt, run);
+    return;
+  }
+  pb_change *change = atomic_load_explicit(&rt->change, memory_order_acquire);
+  if (!change || !change_begins(rt, run, change, &spread)) return;
+  // Taken out before it is begun or made: it may be revoked up to here.
+  if (!atomic_compare_exchange_strong(&rt->change, &change, NULL)) return;
+  run->whole = NULL;
+  if (spread)
+    change_spread(rt, run, change);
+  else
+    change_make(rt, run, change);
+}
+
 static void step_take(pb_realtime *rt, step_run *run, uint32_t flags) {
   const int64_t begin = clock_now();
   flags |= inputs_take(rt, run);
   pb_stepper_step(rt->stepper, run->held.u, flags);
+  if (run->spread) pb_handover_follow(run->spread->carrier->handover, rt->stepper->state);
   pb_histogram_add(&rt->step_time, clock_now() - begin);
   if (!pb_ring_put(&rt->records, &rt->stepper->now)) pb_histogram_raise(&rt->dropped, 1);
   sem_post(&rt->published);
@@ -146,10 +192,11 @@ static void *step_thread(void *context) {
     const int64_t behind = clock_now() - deadline;
     const bool overrun = (double)behind > run.interval;
     pb_histogram_add(&rt->jitter, behind);
-    change_make(rt, &run);
+    change_look(rt, &run);
     step_take(rt, &run, overrun ? PB_FLAG_OVERRUN : 0);
     if (overrun && !overrun_follow(rt, &run, behind)) break;
   }
+  if (run.spread) spread_make(rt, &run);  // whole: nobody else has it any more
   return NULL;
 }
 

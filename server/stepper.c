@@ -65,7 +65,10 @@ void pb_stepper_step(pb_stepper *stepper, const double *u, uint32_t flags) {
 static void model_swap(pb_stepper *stepper, pb_change *change) {
   const pb_model *old_model = stepper->model;
   pb_state *old_state = stepper->state;
-  if (change->transfer) pb_transfer_apply(change->transfer, old_state, change->state);
+  if (change->handover)
+    pb_handover_apply(change->handover, old_state, change->state);
+  else if (change->transfer)
+    pb_transfer_apply(change->transfer, old_state, change->state);
   stepper->model = change->model;
   stepper->state = change->state;
   stepper->revision = change->revision;

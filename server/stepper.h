@@ -12,6 +12,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "carrier.h"
 #include "host.h"
 #include "model/model.h"
 #include "model/transfer.h"
@@ -54,6 +55,8 @@ typedef struct pb_change {
   const pb_model *model;  // NULL: stays
   pb_state *state;        // of that model
   pb_transfer *transfer;  // from the old state to the new one; NULL: `state` is taken as it is
+  pb_carrier *carrier;    // real time: prepared to spread the transfer over steps; NULL: it is not
+  pb_handover *handover;  // set by whoever makes the change when all of it was spread
   uint32_t revision;
   int input_from[PB_STEPPER_INPUTS];  // old index of each input of the model; −1: new
   bool swaps_host;

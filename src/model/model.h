@@ -112,6 +112,9 @@ void pb_step_output(const pb_model *model, const pb_state *state, double *y);
 // No allocation. [rt]
 void pb_step_advance(const pb_model *model, pb_state *state, const double *command);
 
+// x ← A_d x + B_d u of the plant alone: x [nx], u [nu], scratch [widest block]. [rt]
+void pb_step_state(const pb_model *model, double *x, const double *u, double *scratch);
+
 typedef enum pb_time_base {
   PB_CONTINUOUS,  // H(jω) = C (jωI − A)⁻¹ B + D
   PB_SAMPLED,     // H(z) = C (zI − A_d)⁻¹ B_d + D z⁻¹, z = e^{jωT}: from u(k) to y(k)

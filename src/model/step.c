@@ -103,6 +103,10 @@ static void advance(const pb_model *m, double *x, const double *u, double *scrat
   add_inputs(m, u, m->step ? paired : 0, x);
 }
 
+void pb_step_state(const pb_model *m, double *x, const double *u, double *scratch) {
+  advance(m, x, u, scratch);
+}
+
 void pb_step_advance(const pb_model *m, pb_state *s, const double *command) {
   double *x = s->data, *held = s->data + m->nx;
   const double *u = command;

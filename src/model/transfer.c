@@ -237,20 +237,31 @@ static void add_columns(size_t rows, size_t cols, const double *a, const double 
     for (size_t i = 0; i < rows; i++) out[i] += a[i + j * rows] * v[j];
 }
 
-void pb_transfer_apply(pb_transfer *t, const pb_state *before, pb_state *after) {
-  const size_t nx = t->from->nx, mx = t->to->nx;
+// With X x in its place.
+static void finish(pb_transfer *t, const pb_state *before, pb_state *after) {
   memcpy(t->before, before, pb_state_bytes(t->from));
   pb_electronics_carry(t->from, before, t->input_from, t->output_from, t->to, after);
+  add_columns(t->to->nx, t->from->nu, t->u, before->data + t->from->nx, after->data);
+  after->step = before->step;
+  pb_state_measure(t->to, after);
+  memcpy(t->after, after, pb_state_bytes(t->to));
+}
+
+void pb_transfer_apply(pb_transfer *t, const pb_state *before, pb_state *after) {
+  const size_t nx = t->from->nx, mx = t->to->nx;
   if (t->x) {
     memset(after->data, 0, mx * sizeof *after->data);
     add_columns(mx, nx, t->x, before->data, after->data);
   } else {
     memcpy(after->data, before->data, mx * sizeof *after->data);
   }
-  add_columns(mx, t->from->nu, t->u, before->data + nx, after->data);
-  after->step = before->step;
-  pb_state_measure(t->to, after);
-  memcpy(t->after, after, pb_state_bytes(t->to));
+  finish(t, before, after);
+}
+
+void pb_transfer_apply_moved(pb_transfer *t, const pb_state *before, const double *moved,
+                             pb_state *after) {
+  memcpy(after->data, moved, t->to->nx * sizeof *after->data);
+  finish(t, before, after);
 }
 
 // Output o of the plant itself, y = C x + D u, and the sum of the magnitudes that it adds up from.

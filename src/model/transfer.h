@@ -40,6 +40,10 @@ void pb_transfer_free(pb_transfer *transfer);  // NULL is allowed
 // No allocation, no failure. [rt]
 void pb_transfer_apply(pb_transfer *transfer, const pb_state *before, pb_state *after);
 
+// The same where X x is known already: moved [to->nx]. [rt]
+void pb_transfer_apply_moved(pb_transfer *transfer, const pb_state *before, const double *moved,
+                             pb_state *after);
+
 // What the last apply did. Fails with PB_ERR_MEMORY. [init]
 pb_status pb_transfer_examine(const pb_transfer *transfer, pb_transfer_report *out, pb_error *err);
 
