@@ -135,7 +135,7 @@ void source_clear(source *s) {
 // ---- reading ------------------------------------------------------------------------------------
 
 static bool is_plain(const source *s) {
-  return s->files == 1 && !s->nodes && !s->masters && !s->frames && s->modal < 0;
+  return s->files == 1 && !s->nodes && !s->masters && !s->frames && s->modal < 0 && !s->half;
 }
 
 static pb_status load_own(const source *s, loaded *out, pb_error *err) {

@@ -314,17 +314,28 @@ static pb_status check(const char *name, const pb_element_data *e, const pb_trun
 pb_status pb_element_truncate(const char *name, const pb_element_data *data,
                               const pb_truncate_options *options, pb_truncation *out,
                               pb_error *err) {
-  trial t = {.name = name, .e = data, .o = options, .err = err};
+  pb_element *sound = NULL;
   size_t modes = options->modes;
   *out = (pb_truncation){0};
   pb_status st = check(name, data, options, err);
-  if (!st) st = make_interior(name, data, &t.x, err);
+  if (!st)
+    st = pb_element_new(name, data->frames, data->size, data->position, data->k, data->m, NULL,
+                        &sound, err);
+  if (st) return st;
+  const pb_element_data symmetric = {.frames = sound->frames,
+                                     .size = sound->size,
+                                     .position = sound->position,
+                                     .k = sound->k,
+                                     .m = sound->m};
+  trial t = {.name = name, .e = &symmetric, .o = options, .err = err};
+  st = make_interior(name, &symmetric, &t.x, err);
   if (!st) st = rank_modes(name, &t.x, options->high_hz, err);
-  if (!st) st = pb_proof_make(name, data, options, &t.before, err);
+  if (!st) st = pb_proof_make(name, &symmetric, options, &t.before, err);
   if (!st && !modes) st = choose(&t, &modes);
   if (!st) st = finish(&t, modes, out);
   pb_proof_clear(&t.before);
   clear_interior(&t.x);
+  pb_element_free(sound);
   if (st) pb_truncation_clear(out);
   return st;
 }
