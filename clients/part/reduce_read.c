@@ -67,10 +67,7 @@ static pb_status match_rows(const char *k_path, const pb_matrix_file *k, const c
                    " where %s has direction %d of node %" PRId64,
                    y->direction, y->node, k_path, x->direction, x->node);
   }
-  for (size_t e = 0; !st && e < m->count; e++) {
-    m->row[e] = row_of[m->row[e]];
-    m->col[e] = row_of[m->col[e]];
-  }
+  if (!st) pb_matrix_file_reorder(m, row_of);
   free(a.order);
   free(b.order);
   free(row_of);
@@ -152,6 +149,11 @@ static pb_status read_matrices(const reduce_options *o, pb_matrix_file *k, pb_fe
                                pb_error *err) {
   pb_matrix_file m = {0};
   pb_status st = pb_matrix_file_read(o->stiffness, "K", k, err);
+  // Every row has its diagonal: a damaged size is found before memory is taken for it.
+  if (!st && k->rows > k->count)
+    st = pb_fail(err, PB_ERR_SCHEMA, o->stiffness,
+                 "has %zu rows, but %zu entries: there are rows without any stiffness", k->rows,
+                 k->count);
   if (!st) st = pb_matrix_file_read(o->mass, "M", &m, err);
   if (!st) st = match_rows(o->stiffness, k, o->mass, &m, err);
   if (!st) st = pb_matrix_file_symmetric(k, o->stiffness, &fem->k, err);

@@ -37,6 +37,15 @@ static pb_status misfit(job *j, const char *file, const char *format, ...) {
 
 // ---- reading ------------------------------------------------------------------------------------
 
+static bool both_triangles(const pb_matrix_file *f) {
+  bool upper = false, lower = false;
+  for (size_t e = 0; e < f->count; e++) {
+    upper |= f->row[e] < f->col[e];
+    lower |= f->row[e] > f->col[e];
+  }
+  return upper && lower;
+}
+
 static pb_status read_matrices(job *j) {
   const pb_import_request *r = j->r;
   bool same = !strcmp(r->k_file, r->m_file);
@@ -49,6 +58,9 @@ static pb_status read_matrices(job *j) {
   if (j->k.rows != j->m.rows)
     return misfit(j, same ? r->k_file : r->m_file, "M has %zu rows, K has %zu", j->m.rows,
                   j->k.rows);
+  if (r->half && (both_triangles(&j->k) || both_triangles(&j->m)))
+    return misfit(j, both_triangles(&j->k) ? r->k_file : r->m_file,
+                  "--half, but entries lie on both sides of the diagonal");
   if (j->k.rows > LARGEST)
     return misfit(j, r->k_file,
                   "%zu rows are no element but a full model: reduce it (plantbus-part reduce)",
@@ -148,10 +160,7 @@ static pb_status align_mass(job *j) {
       st = misfit(j, j->r->m_file, "direction %d of node %jd is a row of M, but none of K",
                   want.direction, (intmax_t)want.node);
   }
-  for (size_t e = 0; !st && e < j->m.count; e++) {
-    j->m.row[e] = to[j->m.row[e]];
-    j->m.col[e] = to[j->m.col[e]];
-  }
+  if (!st) pb_matrix_file_reorder(&j->m, to);
   free(to);
   return st;
 }
@@ -247,21 +256,10 @@ static void fill(const job *j, const pb_matrix_file *f, double *x) {
   }
 }
 
-static bool both_triangles(const pb_matrix_file *f) {
-  bool upper = false, lower = false;
-  for (size_t e = 0; e < f->count; e++) {
-    upper |= f->row[e] < f->col[e];
-    lower |= f->row[e] > f->col[e];
-  }
-  return upper && lower;
-}
-
 static pb_status make_element(job *j) {
   pb_element_data *e = &j->out->element;
   size_t n = j->k.rows, at;
   *e = (pb_element_data){.frames = j->frames, .size = n};
-  if (j->r->half && (both_triangles(&j->k) || both_triangles(&j->m)))
-    return misfit(j, j->r->k_file, "--half, but entries lie on both sides of the diagonal");
   e->position = calloc(3 * j->frames, sizeof *e->position);
   e->k = calloc(n * n, sizeof *e->k);
   e->m = calloc(n * n, sizeof *e->m);

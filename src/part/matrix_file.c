@@ -231,15 +231,19 @@ static pb_status average(pb_sparse *up, const pb_sparse *low, const char *path, 
   return PB_OK;
 }
 
+void pb_matrix_file_reorder(pb_matrix_file *file, const int64_t *to) {
+  for (size_t k = 0; k < file->count; k++) {
+    file->row[k] = to[file->row[k]];
+    file->col[k] = to[file->col[k]];
+  }
+}
+
 pb_status pb_matrix_file_symmetric(const pb_matrix_file *file, const char *path, pb_sparse *out,
                                    pb_error *err) {
   *out = (pb_sparse){0};
   if (file->rows != file->cols)
     return pb_fail(err, PB_ERR_ELEMENT, path, "is %zu × %zu, not square", file->rows, file->cols);
   triangles t = count_triangles(file);
-  if (file->half && t.upper && t.lower)
-    return pb_fail(err, PB_ERR_ELEMENT, path,
-                   "is symmetric by one triangle, but has entries in both");
   if (!file->half && !t.upper != !t.lower)
     return pb_fail(err, PB_ERR_ELEMENT, path,
                    "is not symmetric: there are entries on one side of the diagonal only (is it "

@@ -140,9 +140,9 @@ static pb_status read_node_table(pb_lines *in, node_list *list) {
 // An n × 3 array of a Matrix Market or MAT file: nodes 1 … n.
 static pb_status take_array(const char *path, const pb_matrix_file *f, node_list *list,
                             pb_error *err) {
-  if (f->cols != 3 || f->rows > 100000000)
-    return pb_fail(err, PB_ERR_SYNTAX, path, "is %zu × %zu, expected n × 3 coordinates", f->rows,
-                   f->cols);
+  if (f->cols != 3 || f->rows > 100000000 || f->half)
+    return pb_fail(err, PB_ERR_SYNTAX, path, "is %s%zu × %zu, expected n × 3 coordinates",
+                   f->half ? "symmetric, " : "", f->rows, f->cols);
   static const double origin[3];
   pb_status st = PB_OK;
   for (size_t i = 0; !st && i < f->rows; i++) st = add_node(list, (int64_t)i + 1, origin, err);
