@@ -167,17 +167,19 @@ static pb_status tie_rigid(reduce_work *w, const reduce_frame *f, pb_error *err)
   return st;
 }
 
+// A node without rows would count as one that stays where it is.
 static pb_status check_frame(const pb_fem *fem, const pb_fem_frame *frame, pb_error *err) {
-  size_t rows = 0;
+  if (!frame->nodes) return pb_fail(err, PB_ERR_ARGUMENT, frame->name, "has no nodes");
   for (size_t i = 0; i < frame->nodes; i++) {
     if (frame->node[i] >= fem->nodes)
       return pb_fail(err, PB_ERR_ARGUMENT, frame->name, "the model has no node of index %zu",
                      frame->node[i]);
-    for (size_t d = 0; d < 3; d++) rows += fem->dof[d + 3 * frame->node[i]] >= 0;
+    const int64_t *dof = fem->dof + 3 * frame->node[i];
+    if (dof[0] < 0 && dof[1] < 0 && dof[2] < 0)
+      return pb_fail(err, PB_ERR_ARGUMENT, frame->name,
+                     "node %" PRId64 " cannot move: K has no row for it",
+                     pb_fem_node_number(fem, frame->node[i]));
   }
-  if (!rows)
-    return pb_fail(err, PB_ERR_ARGUMENT, frame->name,
-                   frame->nodes ? "K has no row for any of the frame's nodes" : "has no nodes");
   return PB_OK;
 }
 
