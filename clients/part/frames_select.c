@@ -189,8 +189,10 @@ pb_status frame_choose_nodes(const frame_source *s, const pb_reader *r, pb_fem_f
   char where[256];
   bool listed, placed = false;
   pb_status st = choose_listed(s, r, frame, &listed, err);
-  if (!st && !listed)
-    for (size_t i = 0; i < s->fem->nodes; i++) s->chosen[i] = true;
+  for (size_t i = 0; !st && !listed && i < s->fem->nodes; i++) {
+    const int64_t *dof = s->fem->dof + 3 * i;  // nodes of no element are no part of a face
+    s->chosen[i] = dof[0] >= 0 || dof[1] >= 0 || dof[2] >= 0;
+  }
   static const char *const by_place[] = {"box", "plane", "cylinder"};
   for (size_t k = 0; !st && k < 3; k++) {
     const cJSON *value = pb_reader_find(r, by_place[k], where);
