@@ -24,19 +24,6 @@ static const struct argp_option option_table[] = {
     {0},
 };
 
-static void parse_ends(doctor_options *o, const char *arg, struct argp_state *state) {
-  double *value = NULL;
-  size_t count = 0;
-  pb_option_double_list(state, "--ends", arg, &value, &count);
-  bool ok = count == 2 && value[0] >= 1 && value[1] >= 1 && value[0] != value[1] &&
-            value[0] == floor(value[0]) && value[1] == floor(value[1]) && value[0] < 1e6 &&
-            value[1] < 1e6;
-  if (!ok) argp_error(state, "--ends: expected two frames, as 1,2");
-  o->base = (size_t)value[0] - 1;
-  o->tip = (size_t)value[1] - 1;
-  free(value);
-}
-
 static void parse_axis(doctor_options *o, const char *arg, struct argp_state *state) {
   double *value = NULL, norm;
   size_t count = 0;
@@ -70,7 +57,7 @@ static error_t parse_option(int key, char *arg, struct argp_state *state) {
     o->json = true;
     break;
   case KEY_ENDS:
-    parse_ends(o, arg, state);
+    source_frame_pair("--ends", arg, &o->base, &o->tip, state);
     break;
   case KEY_AXIS:
     parse_axis(o, arg, state);

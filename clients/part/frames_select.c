@@ -6,6 +6,7 @@
 
 #include "frames_internal.h"
 #include "node_sets.h"
+#include "part/matrix_file.h"
 
 // ---- selections ---------------------------------------------------------------------------------
 
@@ -98,15 +99,7 @@ static pb_status select_surface(const frame_source *s, const cJSON *value, const
 static size_t node_index(const pb_fem *fem, int64_t number) {
   if (!fem->number)
     return number >= 1 && (size_t)number <= fem->nodes ? (size_t)number - 1 : SIZE_MAX;
-  size_t low = 0, high = fem->nodes;  // numbers ascend
-  while (low < high) {
-    size_t middle = (low + high) / 2;
-    if (fem->number[middle] < number)
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  return low < fem->nodes && fem->number[low] == number ? low : SIZE_MAX;
+  return pb_node_index(fem->number, fem->nodes, number);  // numbers ascend
 }
 
 // Node numbers in the order in which the frame lists them, which is that of its weights.

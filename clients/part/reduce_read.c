@@ -76,25 +76,12 @@ static pb_status match_rows(const char *k_path, const pb_matrix_file *k, const c
 
 // ---- rows to nodes ------------------------------------------------------------------------------
 
-static size_t find_node(const pb_node_file *nodes, int64_t number) {
-  size_t low = 0, high = nodes->count;
-  while (low < high) {
-    size_t middle = (low + high) / 2;
-    if (nodes->number[middle] < number) {
-      low = middle + 1;
-    } else {
-      high = middle;
-    }
-  }
-  return low < nodes->count && nodes->number[low] == number ? low : SIZE_MAX;
-}
-
 static pb_status place_rows(const char *path, const pb_row_label *label, size_t rows,
                             const pb_node_file *nodes, const char *node_path, int64_t *dof,
                             pb_error *err) {
   for (size_t i = 0; i < 3 * nodes->count; i++) dof[i] = -1;
   for (size_t r = 0; r < rows; r++) {
-    size_t node = find_node(nodes, label[r].node);
+    size_t node = pb_node_index(nodes->number, nodes->count, label[r].node);
     if (node == SIZE_MAX)
       return pb_fail(err, PB_ERR_SCHEMA, path,
                      "row %zu belongs to node %" PRId64 ", which %s lacks", r + 1, label[r].node,

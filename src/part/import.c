@@ -87,17 +87,8 @@ static pb_status read_lists(job *j) {
 
 // ---- rows ---------------------------------------------------------------------------------------
 
-static bool listed(const job *j, int64_t node, size_t *at) {
-  size_t low = 0, high = j->nodes.count;
-  while (low < high) {
-    size_t middle = (low + high) / 2;
-    if (j->nodes.number[middle] < node)
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  *at = low;
-  return low < j->nodes.count && j->nodes.number[low] == node;
+static size_t place_of(const job *j, int64_t node) {
+  return pb_node_index(j->nodes.number, j->nodes.count, node);
 }
 
 static pb_status labels_of_frames(job *j, size_t frames, const int64_t *frame) {
@@ -176,9 +167,8 @@ static bool frame_index(const job *j, int64_t node, size_t *at) {
 // Modes: rows without a direction, and, where --modal says that there are some, rows of points that
 // have no coordinates.
 static bool is_modal(const job *j, size_t row) {
-  size_t at;
   bool told = j->k.label && j->r->modal > 0;
-  return !j->label[row].direction || (told && !listed(j, j->label[row].node, &at));
+  return !j->label[row].direction || (told && place_of(j, j->label[row].node) == SIZE_MAX);
 }
 
 static pb_status collect_frames(job *j) {
@@ -198,7 +188,7 @@ static pb_status collect_frames(job *j) {
     if (j->r->frames)
       return misfit(j, j->r->k_file, "row %zu belongs to node %jd, which --frames does not name",
                     i + 1, (intmax_t)node);
-    if (!listed(j, node, &at))
+    if (place_of(j, node) == SIZE_MAX)
       return misfit(j, j->r->k_file,
                     "row %zu belongs to node %jd, which the node list lacks (modal coordinates? "
                     "--modal tells how many)",
@@ -258,14 +248,15 @@ static void fill(const job *j, const pb_matrix_file *f, double *x) {
 
 static pb_status make_element(job *j) {
   pb_element_data *e = &j->out->element;
-  size_t n = j->k.rows, at;
+  size_t n = j->k.rows;
   *e = (pb_element_data){.frames = j->frames, .size = n};
   e->position = calloc(3 * j->frames, sizeof *e->position);
   e->k = calloc(n * n, sizeof *e->k);
   e->m = calloc(n * n, sizeof *e->m);
   if (!e->position || !e->k || !e->m) return pb_fail_memory(j->err, j->r->k_file);
   for (size_t f = 0; f < j->frames; f++) {
-    if (!listed(j, j->frame[f], &at))
+    size_t at = place_of(j, j->frame[f]);
+    if (at == SIZE_MAX)
       return misfit(j, j->r->node_file ? j->r->node_file : j->r->k_file,
                     "frame %jd is not among the nodes", (intmax_t)j->frame[f]);
     memcpy(e->position + 3 * f, j->nodes.xyz + 3 * at, 3 * sizeof *e->position);

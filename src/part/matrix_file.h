@@ -87,6 +87,9 @@ typedef struct pb_node_file {
   double *xyz;      // 3 × count
 } pb_node_file;
 
+// Place of a number in an ascending list; SIZE_MAX: it is not there. [any]
+size_t pb_node_index(const int64_t *number, size_t count, int64_t wanted);
+
 pb_status pb_node_file_read(const char *path, pb_node_file *out, pb_error *err);
 void pb_node_file_clear(pb_node_file *file);
 

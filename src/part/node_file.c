@@ -209,6 +209,18 @@ pb_status pb_node_file_read(const char *path, pb_node_file *out, pb_error *err) 
   return st;
 }
 
+size_t pb_node_index(const int64_t *number, size_t count, int64_t wanted) {
+  size_t low = 0, high = count;
+  while (low < high) {
+    size_t middle = (low + high) / 2;
+    if (number[middle] < wanted)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  return low < count && number[low] == wanted ? low : SIZE_MAX;
+}
+
 void pb_node_file_clear(pb_node_file *file) {
   free(file->number);
   free(file->xyz);
