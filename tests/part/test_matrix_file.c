@@ -215,7 +215,7 @@ static void test_messages(void **state) {
       {"%%MatrixMarket matrix coordinate real symmetric\n2 2 4\n1 1 1\n2 2 5\n1 2 1\n2 1 1\n", ":6",
        "stored by its upper triangle"},
       {"MAT_K:\n[ 1, 1]: 1.0 [ 1, 2]: 2.0\n[ 2, 1]: 2.0 [ 2, 2] 3.0\n", ":3", "expected entries"},
-      {"MAT_K:\n[ 1, 1]: 1.0 [ 1, 2]: 2.0\n[ 2, 1]: 2.0 [ 2, 1]: 3.0\n", "", "follows on"},
+      {"MAT_K:\n[ 1, 1]: 1.0 [ 1, 2]: 2.0\n[ 2, 1]: 2.0 [ 2, 1]: 3.0\n", ":3", "follows on"},
       {"MAT_K:\n[1,1]: 1.0\nMAT_K:\n[1,1]: 1.0\n", ":3", "second matrix"},
       {"1 1  1.0000000000000e+00\n1 2  1.0000000000000e+00\n1 3  1.0000000000000e+00\n", ":3",
        "lines are missing"},
@@ -282,6 +282,20 @@ static void test_long_fields(void **state) {
   ASSERT_NEAR(f.value[1], -1.27807052433992e-7, 0);
   ASSERT_NEAR(f.value[3], -3.5e-3, 0);
   pb_matrix_file_clear(&f);
+}
+
+// The line is told however long the path is.
+static void test_long_path(void **state) {
+  (void)state;
+  char path[600];
+  int at = snprintf(path, sizeof path, "%s", folder);
+  while (at < 400) at += snprintf(path + at, sizeof path - (size_t)at, "/.");
+  snprintf(path + at, sizeof path - (size_t)at, "/far.mtx");
+  write_text(path, "%%MatrixMarket matrix coordinate real general\n1 1 1\n1 1 x\n");
+  pb_matrix_file f;
+  pb_error why = {0};
+  assert_int_equal(pb_matrix_file_read(path, NULL, &f, &why), PB_ERR_SYNTAX);
+  assert_non_null(strstr(why.where, "/far.mtx:3"));
 }
 
 // Coordinates are no symmetric matrix: the half that is not stored would be zero.
@@ -440,12 +454,12 @@ static int end(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_round_trip),   cmocka_unit_test(test_both_in_one),
-      cmocka_unit_test(test_truncation),   cmocka_unit_test(test_mutation),
-      cmocka_unit_test(test_messages),     cmocka_unit_test(test_symmetry),
-      cmocka_unit_test(test_long_fields),  cmocka_unit_test(test_symmetric_nodes),
-      cmocka_unit_test(test_listings),     cmocka_unit_test(test_node_forms),
-      cmocka_unit_test(test_broken_nodes),
+      cmocka_unit_test(test_round_trip),      cmocka_unit_test(test_both_in_one),
+      cmocka_unit_test(test_truncation),      cmocka_unit_test(test_mutation),
+      cmocka_unit_test(test_messages),        cmocka_unit_test(test_symmetry),
+      cmocka_unit_test(test_long_fields),     cmocka_unit_test(test_long_path),
+      cmocka_unit_test(test_symmetric_nodes), cmocka_unit_test(test_listings),
+      cmocka_unit_test(test_node_forms),      cmocka_unit_test(test_broken_nodes),
   };
   return cmocka_run_group_tests(tests, begin, end);
 }
