@@ -46,12 +46,15 @@ static pb_status map_rows(reduce_work *w, pb_error *err) {
   for (size_t r = 0; r < w->full; r++) {
     if (w->node_of_row[r] == SIZE_MAX)
       return pb_fail(err, PB_ERR_ARGUMENT, fem->name, "row %zu of K belongs to no node", r + 1);
-    int64_t last = fem->k.start[r + 1] - 1;
-    bool diagonal = last >= fem->k.start[r] && fem->k.row[last] == (int64_t)r;
-    if (!diagonal || !(fem->k.value[last] > 0))
+    int64_t node = pb_fem_node_number(fem, w->node_of_row[r]);
+    if (!(pb_sparse_diagonal(&fem->k, r) > 0))
       return pb_fail(err, PB_ERR_SINGULAR, fem->name,
                      "row %zu of K (node %" PRId64 ") has no positive diagonal: nothing holds it",
-                     r + 1, pb_fem_node_number(fem, w->node_of_row[r]));
+                     r + 1, node);
+    if (pb_sparse_diagonal(&fem->m, r) < 0)
+      return pb_fail(err, PB_ERR_ARGUMENT, fem->name,
+                     "row %zu of M (node %" PRId64 ") has a negative diagonal: %g", r + 1, node,
+                     pb_sparse_diagonal(&fem->m, r));
   }
   return PB_OK;
 }

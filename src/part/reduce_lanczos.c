@@ -120,7 +120,7 @@ static pb_status append(lanczos *z, size_t first, size_t columns, double *h, pb_
     st = reserve(z, z->k + again, err);
   }
   if (!st) {
-    memcpy(z->q + z->k * z->full, z->u, again * z->full * sizeof *z->q);
+    if (again) memcpy(z->q + z->k * z->full, z->u, again * z->full * sizeof *z->q);
     z->k += again;
     z->last = columns;
     z->block = again;

@@ -90,8 +90,8 @@ static pb_status extract(lanczos *z, size_t p, pb_error *err) {
 // Starts again beside the modes found: A Φ = Φ Θ, so nothing leads out of them.
 static void lock(lanczos *z) {
   size_t p = z->w->modes;
-  memcpy(z->q, z->w->phi, p * z->full * sizeof *z->q);
-  memset(z->h, 0, z->room * z->room * sizeof *z->h);
+  if (p) memcpy(z->q, z->w->phi, p * z->full * sizeof *z->q);
+  if (z->room) memset(z->h, 0, z->room * z->room * sizeof *z->h);
   for (size_t i = 0; i < p; i++) z->h[i + i * z->room] = 1 / z->w->omega2[i];
   z->k = p;
   z->block = 0;

@@ -281,6 +281,10 @@ static void test_massless(void **state) {
   REQUIRE(pb_reduce(&fem, &options, false, &r, &err));
   assert_int_equal(r->modes, 0);
   pb_reduction_free(r);
+  pb_error why = {0};
+  options = (pb_reduce_options){.modes = 3};
+  assert_int_equal(pb_reduce(&fem, &options, false, &r, &why), PB_ERR_ARGUMENT);
+  assert_non_null(strstr(why.message, "the model has 0"));
   pb_fem_clear(&fem);
 }
 
@@ -358,6 +362,16 @@ static void test_refusals(void **state) {
   fem.m.value[3] = NAN;
   expect_refusal(&fem, PB_ERR_ARGUMENT, "not finite");
   fem.m.value[3] = value;
+  double *last = &fem.m.value[fem.m.start[8] - 1];
+  value = *last;
+  *last = -1;
+  expect_refusal(&fem, PB_ERR_ARGUMENT, "row 8 of M (node 3) has a negative diagonal");
+  *last = 0;  // a massless row is none
+  pb_reduction *r = NULL;
+  pb_reduce_options options = {.modes = 3};
+  REQUIRE(pb_reduce(&fem, &options, false, &r, &err));
+  pb_reduction_free(r);
+  *last = value;
   pb_fem_clear(&fem);
 }
 
