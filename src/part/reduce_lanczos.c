@@ -130,7 +130,7 @@ static pb_status append(lanczos *z, size_t first, size_t columns, double *h, pb_
 }
 
 pb_status lanczos_append_random(lanczos *z, pb_error *err) {
-  size_t columns = z->limit - z->k < BLOCK ? z->limit - z->k : BLOCK;
+  size_t left = z->k < z->limit ? z->limit - z->k : 0, columns = left < BLOCK ? left : BLOCK;
   double *h = malloc((z->k + 1) * BLOCK * sizeof *h);
   if (!h) return pb_fail_memory(err, "modes");
   for (size_t i = 0; i < columns * z->full; i++)

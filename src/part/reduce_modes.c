@@ -9,9 +9,16 @@
 static const double two_pi = 6.283185307179586476925286766559;
 static const double tolerance = 1e-10;      // of the residual, relative to θ
 static const double next_tolerance = 1e-5;  // of the first mode that is not kept
+static const double rounding = 1e-14;       // of θ, relative to the largest
 static const double distinct = 1e-5;        // of two frequencies, to count between them
 
 // ---- how many -----------------------------------------------------------------------------------
+
+// What rounding leaves of θ = 0 is no mode: the last block reaches beyond the space.
+static bool is_mode(const lanczos *z, size_t i) {
+  return i < z->ritz && i < z->limit && lanczos_omega2(z, i) > 0 &&
+         lanczos_omega2(z, i) < lanczos_omega2(z, 0) / rounding;
+}
 
 // How many modes the present Ritz values promise: by count, or all up to max_hz.
 static size_t wanted(const lanczos *z) {
@@ -19,8 +26,7 @@ static size_t wanted(const lanczos *z) {
   if (!(o->max_hz > 0)) return o->modes;
   double top = two_pi * o->max_hz;
   size_t count = 0;
-  while (count < z->ritz && lanczos_omega2(z, count) > 0 && lanczos_omega2(z, count) <= top * top)
-    count++;
+  while (is_mode(z, count) && lanczos_omega2(z, count) <= top * top) count++;
   return o->modes && o->modes < count ? o->modes : count;
 }
 
@@ -34,7 +40,7 @@ static bool is_done(const lanczos *z, bool used_up, size_t *converged) {
     ++*converged;
   if (*converged < p) return false;
   bool proven = z->w->options->max_hz > 0 || z->w->options->prove;
-  return used_up || !proven || (p < z->ritz && lanczos_residual(z, p) <= next_tolerance);
+  return used_up || !proven || (is_mode(z, p) && lanczos_residual(z, p) <= next_tolerance);
 }
 
 static pb_status fail_missing(const lanczos *z, pb_error *err) {
@@ -57,7 +63,7 @@ static pb_status iterate(lanczos *z, pb_error *err) {
     st = lanczos_decompose(z, err);
     if (st) break;
     checked = n;
-    done = is_done(z, dry || (!z->block && z->k == z->limit), &converged);
+    done = is_done(z, dry || n >= z->limit, &converged);
     if (!done && dry) return fail_missing(z, err);
     st = reduce_progress(z->w, PB_REDUCE_MODES, (double)converged,
                          z->w->options->max_hz > 0 ? 0 : (double)z->w->options->modes, err);
@@ -83,7 +89,7 @@ static pb_status extract(lanczos *z, size_t p, pb_error *err) {
   w->phi = phi;
   w->omega2 = omega2;
   w->modes = p;
-  w->next_omega2 = p < z->ritz ? lanczos_omega2(z, p) : INFINITY;
+  w->next_omega2 = is_mode(z, p) ? lanczos_omega2(z, p) : INFINITY;
   return PB_OK;
 }
 
