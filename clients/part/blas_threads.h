@@ -1,6 +1,6 @@
-// How many threads OpenBLAS may use: all processors where a factorisation multiplies large blocks,
-// one for the many small products besides, which threads only slow down (on a busy machine many
-// times: every product waits for the slowest of them).
+// How many threads OpenBLAS may use: all processors (or as many as OPENBLAS_NUM_THREADS says) where
+// a factorisation multiplies large blocks, one for the many small products besides, which threads
+// only slow down (on a busy machine many times: every product waits for the slowest of them).
 #ifndef PB_CLIENTS_PART_BLAS_THREADS_H
 #define PB_CLIENTS_PART_BLAS_THREADS_H
 

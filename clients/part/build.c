@@ -74,6 +74,15 @@ static void check_suffix(const char *flag, const char *path, bool svg, struct ar
     argp_error(state, "%s: '%s' does not end in %s", flag, path, svg ? ".svg or .png" : ".png");
 }
 
+static void check_sweep(const char *arg, struct argp_state *state) {
+  const char *equal = strchr(arg, '=');
+  if (arg[0] != '/' || !equal) argp_error(state, "--sweep: expected /pointer=value,value,...");
+  double *value = NULL;
+  size_t count;
+  pb_option_double_list(state, "--sweep", equal + 1, &value, &count);
+  free(value);
+}
+
 static void check_line(const build_options *o, struct argp_state *state) {
   bool table = o->sweep || o->densities;
   if (!o->file) argp_error(state, "expected a part file");
@@ -82,8 +91,7 @@ static void check_line(const build_options *o, struct argp_state *state) {
     argp_error(state, "a table of many elements writes no element, picture or full model");
   if (o->plot && !table) argp_error(state, "--plot needs --sweep or --convergence");
   if (o->picture_mode && !o->picture) argp_error(state, "--picture-mode needs --picture");
-  if (o->sweep && (o->sweep[0] != '/' || !strchr(o->sweep, '=')))
-    argp_error(state, "--sweep: expected /pointer=value,value,...");
+  if (o->sweep) check_sweep(o->sweep, state);
 }
 
 static error_t parse_files(int key, char *arg, struct argp_state *state, build_options *o) {

@@ -38,6 +38,26 @@ static double above(const frame *f, double y) {
   return MARGIN + f->scale * (y - f->low);
 }
 
+// A name is anybody's text: as such in XML, and in a string of gnuplot, which a line ends.
+static void put_xml(FILE *out, const char *text) {
+  for (; *text; text++) {
+    unsigned char c = (unsigned char)*text;
+    if (strchr("<>&\"'", c))
+      fprintf(out, "&#%d;", c);
+    else
+      fputc(c < 0x20 ? ' ' : c, out);
+  }
+}
+
+static void put_quoted(FILE *out, const char *text) {
+  fputc('\'', out);
+  for (; *text; text++) {
+    if (*text == '\'') fputc('\'', out);
+    fputc((unsigned char)*text < 0x20 ? ' ' : *text, out);
+  }
+  fputc('\'', out);
+}
+
 pb_status drawing_svg(const drawing *d, const char *path, pb_error *err) {
   pb_outfile file;
   frame f = frame_of(d);
@@ -52,9 +72,10 @@ pb_status drawing_svg(const drawing *d, const char *path, pb_error *err) {
   fprintf(out,
           "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%d\" height=\"%d\">\n"
           "<rect width=\"100%%\" height=\"100%%\" fill=\"white\"/>\n"
-          "<text x=\"%d\" y=\"%d\" font-family=\"sans-serif\" font-size=\"18\">%s</text>\n"
-          "<g stroke=\"#303030\" stroke-width=\"0.6\" stroke-linejoin=\"round\">\n",
-          WIDTH, f.height, MARGIN, MARGIN, d->title);
+          "<text x=\"%d\" y=\"%d\" font-family=\"sans-serif\" font-size=\"18\">",
+          WIDTH, f.height, MARGIN, MARGIN);
+  put_xml(out, d->title);
+  fprintf(out, "</text>\n<g stroke=\"#303030\" stroke-width=\"0.6\" stroke-linejoin=\"round\">\n");
   for (size_t i = 0; i < d->polygons; i++) {
     const polygon *p = d->polygon + i;
     fprintf(out, "<polygon fill=\"#%02x%02x%02x\" points=\"", p->rgb[0], p->rgb[1], p->rgb[2]);
@@ -78,9 +99,10 @@ pb_status drawing_png(const drawing *d, const char *path, pb_error *err) {
   fprintf(script,
           "set terminal pngcairo size %d,%d noenhanced font 'DejaVu Sans,12' background '#ffffff'\n"
           "unset key\nunset border\nunset tics\nset margins 0,0,0,0\n"
-          "set label 1 '%s' at screen 0.03, screen 0.97\n"
-          "set xrange [0:%d]\nset yrange [0:%d]\n",
-          WIDTH, f.height, d->title, WIDTH, f.height);
+          "set xrange [0:%d]\nset yrange [0:%d]\nset label 1 ",
+          WIDTH, f.height, WIDTH, f.height);
+  put_quoted(script, d->title);
+  fprintf(script, " at screen 0.03, screen 0.97\n");
   for (size_t i = 0; i < d->polygons; i++) {
     const polygon *p = d->polygon + i;
     fprintf(script, "set object %zu polygon from ", i + 1);

@@ -5,25 +5,12 @@
 #include <string.h>
 
 #include "base/text.h"
+#include "doctor.h"
 #include "element_out.h"
-#include "jsonout.h"
 #include "options.h"
 #include "part.h"
-#include "plant/element_doctor.h"
-#include "source.h"
-#include "table.h"
 
 enum { KEY_JSON = 0x100, KEY_REPAIR, KEY_WEIGHTED, KEY_SI, KEY_ENDS, KEY_AXIS };
-
-typedef struct options {
-  source in;
-  const char *out;
-  bool json, repair;
-  pb_doctor_options doctor;
-  size_t base, tip;
-  bool has_axis;
-  double axis[3];
-} options;
 
 static const struct argp_option option_table[] = {
     {"repair", KEY_REPAIR, NULL, 0, "Cure what can be cured and write the element to -o", 1},
@@ -37,20 +24,7 @@ static const struct argp_option option_table[] = {
     {0},
 };
 
-static void parse_ends(options *o, const char *arg, struct argp_state *state) {
-  double *value = NULL;
-  size_t count = 0;
-  pb_option_double_list(state, "--ends", arg, &value, &count);
-  bool ok = count == 2 && value[0] >= 1 && value[1] >= 1 && value[0] != value[1] &&
-            value[0] == floor(value[0]) && value[1] == floor(value[1]) && value[0] < 1e6 &&
-            value[1] < 1e6;
-  if (!ok) argp_error(state, "--ends: expected two frames, as 1,2");
-  o->base = (size_t)value[0] - 1;
-  o->tip = (size_t)value[1] - 1;
-  free(value);
-}
-
-static void parse_axis(options *o, const char *arg, struct argp_state *state) {
+static void parse_axis(doctor_options *o, const char *arg, struct argp_state *state) {
   double *value = NULL, norm;
   size_t count = 0;
   pb_option_double_list(state, "--axis", arg, &value, &count);
@@ -62,7 +36,7 @@ static void parse_axis(options *o, const char *arg, struct argp_state *state) {
 }
 
 static error_t parse_option(int key, char *arg, struct argp_state *state) {
-  options *o = state->input;
+  doctor_options *o = state->input;
   switch (key) {
   case ARGP_KEY_INIT:
     state->child_inputs[0] = &o->in;
@@ -83,7 +57,7 @@ static error_t parse_option(int key, char *arg, struct argp_state *state) {
     o->json = true;
     break;
   case KEY_ENDS:
-    parse_ends(o, arg, state);
+    source_frame_pair("--ends", arg, &o->base, &o->tip, state);
     break;
   case KEY_AXIS:
     parse_axis(o, arg, state);
@@ -111,22 +85,7 @@ static const struct argp argp = {
 
 // ---- states of the element ----------------------------------------------------------------------
 
-typedef struct stage {
-  const char *name;
-  bool known;
-  pb_diagnosis d;
-  pb_element_held held;
-} stage;
-
-typedef struct visit {
-  const options *o;
-  loaded from;
-  pb_element_data cured;
-  size_t stages;
-  stage stage[3];
-} visit;
-
-static void default_axis(const options *o, const pb_element_data *e, double axis[3]) {
+static void default_axis(const doctor_options *o, const pb_element_data *e, double axis[3]) {
   double norm = 0;
   memcpy(axis, o->axis, 3 * sizeof *axis);
   if (o->has_axis) return;
@@ -138,8 +97,9 @@ static void default_axis(const options *o, const pb_element_data *e, double axis
   for (size_t a = 0; a < 3; a++) axis[a] = norm > 0 ? axis[a] / norm : a == 2;
 }
 
-static pb_status add_stage(visit *v, const char *name, const pb_element_data *e, pb_error *err) {
-  stage *s = &v->stage[v->stages++];
+static pb_status add_stage(doctor_visit *v, const char *name, const pb_element_data *e,
+                           pb_error *err) {
+  doctor_stage *s = &v->stage[v->stages++];
   s->name = name;
   s->held = (pb_element_held){{NAN, NAN, NAN, NAN}, NAN};
   pb_status st = pb_element_diagnose(v->o->in.file[0], e, &v->o->doctor, &s->d, NULL, err);
@@ -150,14 +110,14 @@ static pb_status add_stage(visit *v, const char *name, const pb_element_data *e,
   return st == PB_ERR_ELEMENT ? PB_OK : st;  // M is not definite: the findings say so
 }
 
-static bool all_curable(const pb_diagnosis *d) {
+bool doctor_all_curable(const pb_diagnosis *d) {
   for (size_t k = 0; k < d->findings; k++)
     if (!d->finding[k].curable) return false;
   return true;
 }
 
 // Cures and looks again; both ways of the projection where one is needed.
-static pb_status add_cures(visit *v, pb_error *err) {
+static pb_status add_cures(doctor_visit *v, pb_error *err) {
   const pb_element_data *e = &v->from.import.element;
   pb_status st = PB_OK;
   for (int k = 0; !st && k < 2; k++) {
@@ -175,164 +135,22 @@ static pb_status add_cures(visit *v, pb_error *err) {
   return st;
 }
 
-static pb_status examine(visit *v, pb_error *err) {
+static pb_status examine(doctor_visit *v, pb_error *err) {
   pb_status st = source_load(&v->o->in, &v->from, err);
   if (!st) st = add_stage(v, "as it is", &v->from.import.element, err);
   const pb_diagnosis *d = &v->stage[0].d;
-  if (!st && d->findings && all_curable(d)) st = add_cures(v, err);
+  if (!st && d->findings && doctor_all_curable(d)) st = add_cures(v, err);
   return st;
-}
-
-// ---- text ---------------------------------------------------------------------------------------
-
-static void row_of_counts(pb_table *t, const visit *v, const char *name,
-                          double (*of)(const stage *)) {
-  pb_table_text(t, name);
-  for (size_t k = 0; k < v->stages; k++) pb_table_count(t, (size_t)of(&v->stage[k]));
-}
-
-static void row(pb_table *t, const visit *v, const char *name, double (*of)(const stage *)) {
-  pb_table_text(t, name);
-  for (size_t k = 0; k < v->stages; k++) pb_table_number(t, of(&v->stage[k]));
-}
-
-static double digits_k(const stage *s) {
-  return s->d.digits_k;
-}
-static double digits_m(const stage *s) {
-  return s->d.digits_m;
-}
-static double asymmetry(const stage *s) {
-  return fmax(s->d.asymmetry_k, s->d.asymmetry_m);
-}
-static double translation(const stage *s) {
-  return s->d.translation_residual;
-}
-static double rotation(const stage *s) {
-  return s->d.rotation_residual;
-}
-static double rigid(const stage *s) {
-  return s->d.rigid_hz[5];
-}
-static double flexible(const stage *s) {
-  return s->d.flexible_hz;
-}
-static double mass(const stage *s) {
-  return s->d.mass;
-}
-static double held_1(const stage *s) {
-  return s->held.hz[0];
-}
-static double held_2(const stage *s) {
-  return s->held.hz[1];
-}
-static double axial(const stage *s) {
-  return s->held.axial_hz;
-}
-
-static double lowest(const stage *s) {
-  double least = s->d.rigid_hz[0];
-  for (int k = 1; k < 6; k++) least = fmin(least, s->d.rigid_hz[k]);
-  return least;
-}
-
-static pb_status print_table(const visit *v, pb_error *err) {
-  pb_table t = {0};
-  char held[64];
-  pb_table_text_column(&t, "");
-  for (size_t k = 0; k < v->stages; k++) pb_table_number_column(&t, v->stage[k].name, NULL, 5);
-  row_of_counts(&t, v, "significant digits of K", digits_k);
-  row_of_counts(&t, v, "significant digits of M", digits_m);
-  row(&t, v, "asymmetry", asymmetry);
-  row(&t, v, "K against translations", translation);
-  row(&t, v, "K against rotations", rotation);
-  row(&t, v, "rigid motions, largest [Hz]", rigid);
-  row(&t, v, "rigid motions, lowest [Hz]", lowest);
-  row(&t, v, "first flexible mode, free [Hz]", flexible);
-  snprintf(held, sizeof held, "frame %zu held: mode 1 [Hz]", v->o->base + 1);
-  row(&t, v, held, held_1);
-  snprintf(held, sizeof held, "frame %zu held: mode 2 [Hz]", v->o->base + 1);
-  row(&t, v, held, held_2);
-  row(&t, v, "axial mode [Hz]", axial);
-  row(&t, v, "mass [kg]", mass);
-  pb_status st = pb_table_print(&t, stdout, 0, err);
-  pb_table_free(&t);
-  return st;
-}
-
-static pb_status print_text(const visit *v, pb_error *err) {
-  const pb_diagnosis *d = &v->stage[0].d;
-  printf("%s: %zu frames, %zu modes\n\n", v->o->in.file[0], d->frames, d->size - 6 * d->frames);
-  pb_status st = print_table(v, err);
-  putchar('\n');
-  for (size_t k = 0; k < d->findings; k++)
-    printf("%s: %s\n    %s%s\n", pb_finding_name(d->finding[k].code), d->finding[k].saw,
-           !d->finding[k].curable ? ""
-           : v->o->repair         ? "repair "
-                                  : "--repair ",
-           d->finding[k].would);
-  if (!d->findings) puts("sound: nothing to repair");
-  if (v->stages == 3 && !v->o->doctor.weighted)
-    puts("'weighted' is what --weighted would make of it.");
-  if (v->o->repair && v->cured.k) printf("written to %s\n", v->o->out);
-  return st;
-}
-
-// ---- JSON ---------------------------------------------------------------------------------------
-
-static void stage_json(pb_jsonout *json, const stage *s) {
-  pb_jsonout_object(json, NULL);
-  pb_jsonout_text(json, "state", s->name);
-  pb_jsonout_integer(json, "digits_k", (uint64_t)s->d.digits_k);
-  pb_jsonout_integer(json, "digits_m", (uint64_t)s->d.digits_m);
-  pb_jsonout_number(json, "asymmetry_k", s->d.asymmetry_k);
-  pb_jsonout_number(json, "asymmetry_m", s->d.asymmetry_m);
-  pb_jsonout_number(json, "translation_residual", s->d.translation_residual);
-  pb_jsonout_number(json, "rotation_residual", s->d.rotation_residual);
-  pb_jsonout_number(json, "mass_smallest_eigenvalue", s->d.mass_smallest);
-  pb_jsonout_numbers(json, "rigid_hz", s->d.rigid_hz, 6);
-  pb_jsonout_number(json, "flexible_hz", s->d.flexible_hz);
-  pb_jsonout_numbers(json, "held_hz", s->held.hz, 4);
-  pb_jsonout_number(json, "axial_hz", s->held.axial_hz);
-  pb_jsonout_number(json, "mass", s->d.mass);
-  pb_jsonout_object_end(json);
-}
-
-static void print_json(const visit *v) {
-  const pb_diagnosis *d = &v->stage[0].d;
-  pb_jsonout json;
-  pb_jsonout_begin(&json, stdout);
-  pb_jsonout_object(&json, NULL);
-  pb_jsonout_text(&json, "file", v->o->in.file[0]);
-  pb_jsonout_boolean(&json, "sound", !d->findings);
-  pb_jsonout_boolean(&json, "curable", all_curable(d));
-  pb_jsonout_boolean(&json, "repaired", v->o->repair && v->cured.k);
-  pb_jsonout_number(&json, "change", d->change);
-  pb_jsonout_array(&json, "findings");
-  for (size_t k = 0; k < d->findings; k++) {
-    pb_jsonout_object(&json, NULL);
-    pb_jsonout_text(&json, "finding", pb_finding_name(d->finding[k].code));
-    pb_jsonout_boolean(&json, "curable", d->finding[k].curable);
-    pb_jsonout_text(&json, "saw", d->finding[k].saw);
-    pb_jsonout_text(&json, "would", d->finding[k].would);
-    pb_jsonout_object_end(&json);
-  }
-  pb_jsonout_array_end(&json);
-  pb_jsonout_array(&json, "states");
-  for (size_t k = 0; k < v->stages; k++) stage_json(&json, &v->stage[k]);
-  pb_jsonout_array_end(&json);
-  pb_jsonout_object_end(&json);
-  pb_jsonout_end(&json);
 }
 
 // ---- writing ------------------------------------------------------------------------------------
 
-static pb_status write_cured(const visit *v, pb_error *err) {
+static pb_status write_cured(doctor_visit *v, pb_error *err) {
   const pb_diagnosis *d = &v->stage[0].d;
   const pb_element_data *e = v->cured.k ? &v->cured : &v->from.import.element;
   char *from = source_provenance(&v->o->in, &v->from);
   pb_text text = {0};
-  if (!all_curable(d)) {
+  if (!doctor_all_curable(d)) {
     free(from);
     return pb_fail(err, PB_ERR_ELEMENT, v->o->in.file[0], "cannot be repaired; nothing is written");
   }
@@ -348,21 +166,25 @@ static pb_status write_cured(const visit *v, pb_error *err) {
                               .m = e->m,
                               .provenance = text.text};
   if (!st) st = pb_element_write(&out, v->o->out, PB_ELEMENT_BY_SUFFIX, err);
+  v->written = !st;
   free(from);
   free(text.text);
   return st;
 }
 
 int part_doctor(int argc, char **argv) {
-  options o = {.base = 0, .tip = 1};
+  doctor_options o = {.base = 0, .tip = 1};
   pb_error err = {0};
   source_begin(&o.in);
   pb_options_parse(&argp, argc, argv, &o);
-  visit v = {.o = &o};
+  doctor_visit v = {.o = &o};
   pb_status st = examine(&v, &err);
-  if (!st && o.json) print_json(&v);
-  if (!st && !o.json) st = print_text(&v, &err);
-  if (!st && o.repair) st = write_cured(&v, &err);
+  if (!st) {
+    pb_error late = {0};
+    pb_status written = o.repair ? write_cured(&v, &err) : PB_OK;
+    st = doctor_report(&v, written ? &late : &err);
+    if (written) st = written;
+  }
   if (st) pb_print_error(stderr, &err);
   bool sound = !st && (o.repair || !v.stage[0].d.findings);
   pb_element_data_clear(&v.cured);

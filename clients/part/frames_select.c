@@ -6,6 +6,7 @@
 
 #include "frames_internal.h"
 #include "node_sets.h"
+#include "part/matrix_file.h"
 
 // ---- selections ---------------------------------------------------------------------------------
 
@@ -98,15 +99,7 @@ static pb_status select_surface(const frame_source *s, const cJSON *value, const
 static size_t node_index(const pb_fem *fem, int64_t number) {
   if (!fem->number)
     return number >= 1 && (size_t)number <= fem->nodes ? (size_t)number - 1 : SIZE_MAX;
-  size_t low = 0, high = fem->nodes;  // numbers ascend
-  while (low < high) {
-    size_t middle = (low + high) / 2;
-    if (fem->number[middle] < number)
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  return low < fem->nodes && fem->number[low] == number ? low : SIZE_MAX;
+  return pb_node_index(fem->number, fem->nodes, number);  // numbers ascend
 }
 
 // Node numbers in the order in which the frame lists them, which is that of its weights.
@@ -189,8 +182,10 @@ pb_status frame_choose_nodes(const frame_source *s, const pb_reader *r, pb_fem_f
   char where[256];
   bool listed, placed = false;
   pb_status st = choose_listed(s, r, frame, &listed, err);
-  if (!st && !listed)
-    for (size_t i = 0; i < s->fem->nodes; i++) s->chosen[i] = true;
+  for (size_t i = 0; !st && !listed && i < s->fem->nodes; i++) {
+    const int64_t *dof = s->fem->dof + 3 * i;  // nodes of no element are no part of a face
+    s->chosen[i] = dof[0] >= 0 || dof[1] >= 0 || dof[2] >= 0;
+  }
   static const char *const by_place[] = {"box", "plane", "cylinder"};
   for (size_t k = 0; !st && k < 3; k++) {
     const cJSON *value = pb_reader_find(r, by_place[k], where);

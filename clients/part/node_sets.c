@@ -8,6 +8,8 @@
 
 #include "part/lines.h"
 
+enum { MOST = 100000000 };  // nodes of a range: a damaged line must not fill the memory
+
 typedef enum block { OTHER, NODES, LIST, GENERATE } block;
 
 typedef struct reading {
@@ -79,7 +81,11 @@ static void read_range(reading *r) {
     pb_lines_fail(&r->in, "expected first, last and step of a range of nodes");
     return;
   }
-  for (int64_t i = first; i <= last && keep(r, i); i += step) {
+  if ((last - first) / step >= MOST) {
+    pb_lines_fail(&r->in, "a range of more than %d nodes", MOST);
+    return;
+  }
+  for (int64_t k = 0; k <= (last - first) / step && keep(r, first + k * step); k++) {
   }
 }
 

@@ -67,10 +67,7 @@ static pb_status match_rows(const char *k_path, const pb_matrix_file *k, const c
                    " where %s has direction %d of node %" PRId64,
                    y->direction, y->node, k_path, x->direction, x->node);
   }
-  for (size_t e = 0; !st && e < m->count; e++) {
-    m->row[e] = row_of[m->row[e]];
-    m->col[e] = row_of[m->col[e]];
-  }
+  if (!st) pb_matrix_file_reorder(m, row_of);
   free(a.order);
   free(b.order);
   free(row_of);
@@ -79,25 +76,12 @@ static pb_status match_rows(const char *k_path, const pb_matrix_file *k, const c
 
 // ---- rows to nodes ------------------------------------------------------------------------------
 
-static size_t find_node(const pb_node_file *nodes, int64_t number) {
-  size_t low = 0, high = nodes->count;
-  while (low < high) {
-    size_t middle = (low + high) / 2;
-    if (nodes->number[middle] < number) {
-      low = middle + 1;
-    } else {
-      high = middle;
-    }
-  }
-  return low < nodes->count && nodes->number[low] == number ? low : SIZE_MAX;
-}
-
 static pb_status place_rows(const char *path, const pb_row_label *label, size_t rows,
                             const pb_node_file *nodes, const char *node_path, int64_t *dof,
                             pb_error *err) {
   for (size_t i = 0; i < 3 * nodes->count; i++) dof[i] = -1;
   for (size_t r = 0; r < rows; r++) {
-    size_t node = find_node(nodes, label[r].node);
+    size_t node = pb_node_index(nodes->number, nodes->count, label[r].node);
     if (node == SIZE_MAX)
       return pb_fail(err, PB_ERR_SCHEMA, path,
                      "row %zu belongs to node %" PRId64 ", which %s lacks", r + 1, label[r].node,
@@ -152,6 +136,11 @@ static pb_status read_matrices(const reduce_options *o, pb_matrix_file *k, pb_fe
                                pb_error *err) {
   pb_matrix_file m = {0};
   pb_status st = pb_matrix_file_read(o->stiffness, "K", k, err);
+  // Every row has its diagonal: a damaged size is found before memory is taken for it.
+  if (!st && k->rows > k->count)
+    st = pb_fail(err, PB_ERR_SCHEMA, o->stiffness,
+                 "has %zu rows, but %zu entries: there are rows without any stiffness", k->rows,
+                 k->count);
   if (!st) st = pb_matrix_file_read(o->mass, "M", &m, err);
   if (!st) st = match_rows(o->stiffness, k, o->mass, &m, err);
   if (!st) st = pb_matrix_file_symmetric(k, o->stiffness, &fem->k, err);

@@ -86,6 +86,22 @@ static void parse_frames(source *s, const char *text, struct argp_state *state) 
   free(value);
 }
 
+static bool is_frame(double value) {
+  return value >= 1 && value < 1e6 && value == floor(value);
+}
+
+void source_frame_pair(const char *flag, const char *arg, size_t *a, size_t *b,
+                       struct argp_state *state) {
+  double *value = NULL;
+  size_t count = 0;
+  pb_option_double_list(state, flag, arg, &value, &count);
+  if (count != 2 || !is_frame(value[0]) || !is_frame(value[1]) || value[0] == value[1])
+    argp_error(state, "%s: expected two frames, as 1,2", flag);
+  *a = (size_t)value[0] - 1;
+  *b = (size_t)value[1] - 1;
+  free(value);
+}
+
 static error_t parse_option(int key, char *arg, struct argp_state *state) {
   source *s = state->input;
   switch (key) {
@@ -135,7 +151,7 @@ void source_clear(source *s) {
 // ---- reading ------------------------------------------------------------------------------------
 
 static bool is_plain(const source *s) {
-  return s->files == 1 && !s->nodes && !s->masters && !s->frames && s->modal < 0;
+  return s->files == 1 && !s->nodes && !s->masters && !s->frames && s->modal < 0 && !s->half;
 }
 
 static pb_status load_own(const source *s, loaded *out, pb_error *err) {

@@ -21,6 +21,11 @@ typedef struct source {
 // As an argp child with a source* as its input; takes the positional arguments, too.
 extern const struct argp source_argp;
 
+// Two different frames "A,B", from 1 on the command line, from 0 here; anything else is a usage
+// error.
+void source_frame_pair(const char *flag, const char *arg, size_t *a, size_t *b,
+                       struct argp_state *state);
+
 void source_begin(source *s);
 void source_clear(source *s);
 

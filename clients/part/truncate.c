@@ -52,19 +52,6 @@ static const struct argp_option option_table[] = {
     {0},
 };
 
-static void parse_pair(const char *flag, const char *arg, size_t *a, size_t *b,
-                       struct argp_state *state) {
-  double *value = NULL;
-  size_t count = 0;
-  pb_option_double_list(state, flag, arg, &value, &count);
-  bool ok = count == 2 && value[0] >= 1 && value[1] >= 1 && value[0] < 1e6 && value[1] < 1e6 &&
-            value[0] == floor(value[0]) && value[1] == floor(value[1]) && value[0] != value[1];
-  if (!ok) argp_error(state, "%s: expected two frames, as 1,2", flag);
-  *a = (size_t)value[0] - 1;
-  *b = (size_t)value[1] - 1;
-  free(value);
-}
-
 static void parse_band(options *o, const char *arg, struct argp_state *state) {
   double *value = NULL;
   size_t count = 0;
@@ -114,14 +101,14 @@ static error_t parse_option(int key, char *arg, struct argp_state *state) {
     t->modes = (size_t)pb_option_uint64(state, "--modes", arg, 1, 20000);
     break;
   case KEY_ENDS:
-    parse_pair("--ends", arg, &t->base, &t->tip, state);
+    source_frame_pair("--ends", arg, &t->base, &t->tip, state);
     break;
   case KEY_ACTUATOR:
-    parse_pair("--actuator", arg, &t->actuator[0], &t->actuator[1], state);
+    source_frame_pair("--actuator", arg, &t->actuator[0], &t->actuator[1], state);
     o->has_actuator = true;
     break;
   case KEY_SENSOR:
-    parse_pair("--sensor", arg, &t->sensor[0], &t->sensor[1], state);
+    source_frame_pair("--sensor", arg, &t->sensor[0], &t->sensor[1], state);
     o->has_sensor = true;
     break;
   case KEY_PAYLOAD:

@@ -22,7 +22,7 @@ static void start(pb_factor *f) {
   f->common.quick_return_if_not_posdef = true;
   f->common.nmethods = 1;
   f->common.method[0].ordering = CHOLMOD_NATURAL;  // ours is made before
-  f->common.postorder = true;
+  f->common.postorder = false;
 }
 
 void pb_factor_clear(pb_factor *f) {

@@ -37,6 +37,15 @@ static pb_status misfit(job *j, const char *file, const char *format, ...) {
 
 // ---- reading ------------------------------------------------------------------------------------
 
+static bool both_triangles(const pb_matrix_file *f) {
+  bool upper = false, lower = false;
+  for (size_t e = 0; e < f->count; e++) {
+    upper |= f->row[e] < f->col[e];
+    lower |= f->row[e] > f->col[e];
+  }
+  return upper && lower;
+}
+
 static pb_status read_matrices(job *j) {
   const pb_import_request *r = j->r;
   bool same = !strcmp(r->k_file, r->m_file);
@@ -49,6 +58,9 @@ static pb_status read_matrices(job *j) {
   if (j->k.rows != j->m.rows)
     return misfit(j, same ? r->k_file : r->m_file, "M has %zu rows, K has %zu", j->m.rows,
                   j->k.rows);
+  if (r->half && (both_triangles(&j->k) || both_triangles(&j->m)))
+    return misfit(j, both_triangles(&j->k) ? r->k_file : r->m_file,
+                  "--half, but entries lie on both sides of the diagonal");
   if (j->k.rows > LARGEST)
     return misfit(j, r->k_file,
                   "%zu rows are no element but a full model: reduce it (plantbus-part reduce)",
@@ -75,17 +87,8 @@ static pb_status read_lists(job *j) {
 
 // ---- rows ---------------------------------------------------------------------------------------
 
-static bool listed(const job *j, int64_t node, size_t *at) {
-  size_t low = 0, high = j->nodes.count;
-  while (low < high) {
-    size_t middle = (low + high) / 2;
-    if (j->nodes.number[middle] < node)
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  *at = low;
-  return low < j->nodes.count && j->nodes.number[low] == node;
+static size_t place_of(const job *j, int64_t node) {
+  return pb_node_index(j->nodes.number, j->nodes.count, node);
 }
 
 static pb_status labels_of_frames(job *j, size_t frames, const int64_t *frame) {
@@ -148,10 +151,7 @@ static pb_status align_mass(job *j) {
       st = misfit(j, j->r->m_file, "direction %d of node %jd is a row of M, but none of K",
                   want.direction, (intmax_t)want.node);
   }
-  for (size_t e = 0; !st && e < j->m.count; e++) {
-    j->m.row[e] = to[j->m.row[e]];
-    j->m.col[e] = to[j->m.col[e]];
-  }
+  if (!st) pb_matrix_file_reorder(&j->m, to);
   free(to);
   return st;
 }
@@ -167,9 +167,8 @@ static bool frame_index(const job *j, int64_t node, size_t *at) {
 // Modes: rows without a direction, and, where --modal says that there are some, rows of points that
 // have no coordinates.
 static bool is_modal(const job *j, size_t row) {
-  size_t at;
   bool told = j->k.label && j->r->modal > 0;
-  return !j->label[row].direction || (told && !listed(j, j->label[row].node, &at));
+  return !j->label[row].direction || (told && place_of(j, j->label[row].node) == SIZE_MAX);
 }
 
 static pb_status collect_frames(job *j) {
@@ -189,7 +188,7 @@ static pb_status collect_frames(job *j) {
     if (j->r->frames)
       return misfit(j, j->r->k_file, "row %zu belongs to node %jd, which --frames does not name",
                     i + 1, (intmax_t)node);
-    if (!listed(j, node, &at))
+    if (place_of(j, node) == SIZE_MAX)
       return misfit(j, j->r->k_file,
                     "row %zu belongs to node %jd, which the node list lacks (modal coordinates? "
                     "--modal tells how many)",
@@ -247,27 +246,17 @@ static void fill(const job *j, const pb_matrix_file *f, double *x) {
   }
 }
 
-static bool both_triangles(const pb_matrix_file *f) {
-  bool upper = false, lower = false;
-  for (size_t e = 0; e < f->count; e++) {
-    upper |= f->row[e] < f->col[e];
-    lower |= f->row[e] > f->col[e];
-  }
-  return upper && lower;
-}
-
 static pb_status make_element(job *j) {
   pb_element_data *e = &j->out->element;
-  size_t n = j->k.rows, at;
+  size_t n = j->k.rows;
   *e = (pb_element_data){.frames = j->frames, .size = n};
-  if (j->r->half && (both_triangles(&j->k) || both_triangles(&j->m)))
-    return misfit(j, j->r->k_file, "--half, but entries lie on both sides of the diagonal");
   e->position = calloc(3 * j->frames, sizeof *e->position);
   e->k = calloc(n * n, sizeof *e->k);
   e->m = calloc(n * n, sizeof *e->m);
   if (!e->position || !e->k || !e->m) return pb_fail_memory(j->err, j->r->k_file);
   for (size_t f = 0; f < j->frames; f++) {
-    if (!listed(j, j->frame[f], &at))
+    size_t at = place_of(j, j->frame[f]);
+    if (at == SIZE_MAX)
       return misfit(j, j->r->node_file ? j->r->node_file : j->r->k_file,
                     "frame %jd is not among the nodes", (intmax_t)j->frame[f]);
     memcpy(e->position + 3 * f, j->nodes.xyz + 3 * at, 3 * sizeof *e->position);

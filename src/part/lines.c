@@ -41,8 +41,11 @@ void pb_lines_close(pb_lines *in) {
 }
 
 pb_status pb_lines_fail(pb_lines *in, const char *format, ...) {
-  char where[256], message[512];
-  snprintf(where, sizeof where, "%s:%zu", in->path, in->number);
+  enum { NUMBER = 24 };
+  char where[sizeof in->err->where], message[512];
+  size_t length = strlen(in->path), most = sizeof where - NUMBER;  // of a long path its end
+  snprintf(where, sizeof where, "%s:%zu", in->path + (length > most ? length - most : 0),
+           in->number);
   va_list args;
   va_start(args, format);
   vsnprintf(message, sizeof message, format, args);

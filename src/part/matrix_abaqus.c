@@ -150,7 +150,7 @@ static pb_status read_directions(pb_lines *in, pb_matrix_build *b, const user_el
     int64_t place = 1, d;
     char *at = in->text;
     bool ok = !directions || (pb_scan_integer(&at, &place) && pb_scan_separator(&at, ","));
-    if (!ok || place < 1 || (directions && (size_t)place <= from + 0) || (size_t)place > e->nodes)
+    if (!ok || place < 1 || (directions && (size_t)place < from + 2) || (size_t)place > e->nodes)
       return pb_lines_fail(in, "expected the place of a node and its directions");
     pb_status st = PB_OK;
     if (directions) st = add_rows(in, b, e, from, (size_t)place - 1, direction, directions);

@@ -28,6 +28,12 @@ static bool is_title(const char *text, char name[64]) {
   return true;
 }
 
+// Places go on row by row or, of sparse matrices, column by column: at least never back.
+static bool goes_on(const pb_matrix_file *f, size_t k, bool by_columns) {
+  int64_t row = f->row[k] - f->row[k - 1], col = f->col[k] - f->col[k - 1];
+  return row > 0 || (row == 0 && col > 0) || (by_columns && col > 0);
+}
+
 static pb_status read_entries(pb_lines *in, pb_matrix_build *b) {
   char *at = in->text;
   while (!pb_scan_done(at)) {
@@ -41,30 +47,29 @@ static pb_status read_entries(pb_lines *in, pb_matrix_build *b) {
       return pb_lines_fail(in, "[%jd, %jd] is no place in a matrix", (intmax_t)row, (intmax_t)col);
     pb_status st = pb_matrix_build_add(b, row - 1, col - 1, value, in->err);
     if (st) return st;
+    const pb_matrix_file *f = b->file;
+    size_t last = f->count - 1;
+    if (last > b->section[b->sections - 1].begin && !goes_on(f, last, true))
+      return pb_lines_fail(in, "entry [%jd, %jd] follows on [%jd, %jd]", (intmax_t)row,
+                           (intmax_t)col, (intmax_t)f->row[last - 1] + 1,
+                           (intmax_t)f->col[last - 1] + 1);
   }
   return PB_OK;
 }
 
-// A dense matrix has its places in order, row by row, and all of them: what is missing is found.
-// Sparse ones at least never go back.
+// A dense matrix has its places row by row, and all of them: what is missing is found.
 static pb_status check_order(const pb_matrix_build *b, const char *path, pb_error *err) {
-  pb_matrix_file *f = b->file;
-  bool dense = f->rows <= 65536 && f->count > f->rows * f->cols / 2;
-  for (size_t k = 1; k < f->count; k++) {
-    bool forward =
-        f->row[k] > f->row[k - 1] || (f->row[k] == f->row[k - 1] && f->col[k] > f->col[k - 1]);
-    bool down =
-        f->col[k] > f->col[k - 1] || (f->col[k] == f->col[k - 1] && f->row[k] > f->row[k - 1]);
-    if (forward || (down && !dense)) continue;
-    return pb_fail(err, PB_ERR_SYNTAX, path, "entry [%jd, %jd] follows on [%jd, %jd]",
-                   (intmax_t)f->row[k] + 1, (intmax_t)f->col[k] + 1, (intmax_t)f->row[k - 1] + 1,
-                   (intmax_t)f->col[k - 1] + 1);
-  }
-  if (dense && !f->half && (f->count != f->rows * f->cols || f->rows != f->cols))
-    return pb_fail(err, PB_ERR_SYNTAX, path,
-                   "holds %zu entries of a %zu × %zu matrix: it is cut or not square", f->count,
-                   f->rows, f->cols);
-  return PB_OK;
+  const pb_matrix_file *f = b->file;
+  if (f->rows > 65536 || f->count <= f->rows * f->cols / 2) return PB_OK;
+  for (size_t k = 1; k < f->count; k++)
+    if (!goes_on(f, k, false))
+      return pb_fail(err, PB_ERR_SYNTAX, path, "entry [%jd, %jd] follows on [%jd, %jd]",
+                     (intmax_t)f->row[k] + 1, (intmax_t)f->col[k] + 1, (intmax_t)f->row[k - 1] + 1,
+                     (intmax_t)f->col[k - 1] + 1);
+  if (f->half || (f->count == f->rows * f->cols && f->rows == f->cols)) return PB_OK;
+  return pb_fail(err, PB_ERR_SYNTAX, path,
+                 "holds %zu entries of a %zu × %zu matrix: it is cut or not square", f->count,
+                 f->rows, f->cols);
 }
 
 pb_status pb_read_ansys_print(pb_lines *in, const char *name, pb_matrix_build *b) {

@@ -204,11 +204,6 @@ static pb_status take_triangle(const pb_matrix_file *f, bool upper, pb_sparse *o
   return st;
 }
 
-static double diagonal(const pb_sparse *a, size_t j) {
-  int64_t last = a->start[j + 1] - 1;
-  return last >= a->start[j] && a->row[last] == (int64_t)j ? a->value[last] : 0;
-}
-
 // The mean of two triangles into `up`; an entry that one of them lacks is zero there. Both have
 // their rows ascending. Places of `low` alone only pass where they are negligible, and are dropped.
 static pb_status average(pb_sparse *up, const pb_sparse *low, const char *path, pb_error *err) {
@@ -219,7 +214,7 @@ static pb_status average(pb_sparse *up, const pb_sparse *low, const char *path, 
       int64_t rb = b < low->start[j + 1] ? low->row[b] : INT64_MAX;
       int64_t row = ra < rb ? ra : rb;
       double x = ra == row ? up->value[a] : 0, y = rb == row ? low->value[b] : 0;
-      double size = sqrt(fabs(diagonal(up, (size_t)row) * diagonal(up, j)));
+      double size = sqrt(fabs(pb_sparse_diagonal(up, (size_t)row) * pb_sparse_diagonal(up, j)));
       if (fabs(x - y) > 1e-6 * size)
         return pb_fail(err, PB_ERR_ELEMENT, path,
                        "is not symmetric: entry (%jd, %zu) is %g, entry (%zu, %jd) is %g",
@@ -231,15 +226,19 @@ static pb_status average(pb_sparse *up, const pb_sparse *low, const char *path, 
   return PB_OK;
 }
 
+void pb_matrix_file_reorder(pb_matrix_file *file, const int64_t *to) {
+  for (size_t k = 0; k < file->count; k++) {
+    file->row[k] = to[file->row[k]];
+    file->col[k] = to[file->col[k]];
+  }
+}
+
 pb_status pb_matrix_file_symmetric(const pb_matrix_file *file, const char *path, pb_sparse *out,
                                    pb_error *err) {
   *out = (pb_sparse){0};
   if (file->rows != file->cols)
     return pb_fail(err, PB_ERR_ELEMENT, path, "is %zu × %zu, not square", file->rows, file->cols);
   triangles t = count_triangles(file);
-  if (file->half && t.upper && t.lower)
-    return pb_fail(err, PB_ERR_ELEMENT, path,
-                   "is symmetric by one triangle, but has entries in both");
   if (!file->half && !t.upper != !t.lower)
     return pb_fail(err, PB_ERR_ELEMENT, path,
                    "is not symmetric: there are entries on one side of the diagonal only (is it "

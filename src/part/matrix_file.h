@@ -35,10 +35,11 @@ typedef struct pb_row_label {
 typedef struct pb_matrix_file {
   pb_matrix_format format;
   size_t rows, cols;
-  size_t count;         // entries
-  int64_t *row, *col;   // [count] from 0
-  double *value;        // [count]
-  bool half;            // only one triangle of a symmetric matrix is stored
+  size_t count;        // entries
+  int64_t *row, *col;  // [count] from 0
+  double *value;       // [count]
+  bool
+      half;  // one triangle of a symmetric matrix is stored: each entry stands for its mirror image
   pb_row_label *label;  // [rows], or NULL where the format tells none
 } pb_matrix_file;
 
@@ -54,10 +55,13 @@ pb_status pb_matrix_file_read(const char *path, const char *name, pb_matrix_file
                               pb_error *err);
 void pb_matrix_file_clear(pb_matrix_file *file);
 
-// As a symmetric sparse matrix: of a `half` file the one triangle as it is (PB_ERR_ELEMENT where
-// entries lie in both); of another one the mean of both triangles where they agree to 1e-6 of
-// √(x_ii x_jj), else PB_ERR_ELEMENT, which says so where only one triangle is there. Entries of
-// equal place are added up. Fails with PB_ERR_MEMORY, too. path names the file in errors. [init]
+// Row i becomes row to[i], columns alike. Labels stay. [any]
+void pb_matrix_file_reorder(pb_matrix_file *file, const int64_t *to);
+
+// As a symmetric sparse matrix: of a `half` file its entries as they are; of another one the mean
+// of both triangles where they agree to 1e-6 of √(x_ii x_jj), else PB_ERR_ELEMENT, which says so
+// where only one triangle is there. Entries of equal place are added up. Fails with PB_ERR_MEMORY,
+// too. path names the file in errors. [init]
 pb_status pb_matrix_file_symmetric(const pb_matrix_file *file, const char *path, pb_sparse *out,
                                    pb_error *err);
 
@@ -82,6 +86,9 @@ typedef struct pb_node_file {
   int64_t *number;  // [count] ascending
   double *xyz;      // 3 × count
 } pb_node_file;
+
+// Place of a number in an ascending list; SIZE_MAX: it is not there. [any]
+size_t pb_node_index(const int64_t *number, size_t count, int64_t wanted);
 
 pb_status pb_node_file_read(const char *path, pb_node_file *out, pb_error *err);
 void pb_node_file_clear(pb_node_file *file);

@@ -82,8 +82,10 @@ static pb_status ended_early(pb_lines *in, size_t k, size_t count) {
   return pb_lines_fail(in, "the file ends after %zu of %zu entries", k, count);
 }
 
-static pb_status read_coordinate(pb_lines *in, pb_matrix_build *b, size_t count) {
+// Of a symmetric matrix one triangle is stored, either one: with both each entry would count twice.
+static pb_status read_coordinate(pb_lines *in, pb_matrix_build *b, bool symmetric, size_t count) {
   pb_matrix_file *f = b->file;
+  bool upper = false, lower = false;
   for (size_t k = 0; k < count; k++) {
     int64_t row, col;
     double value;
@@ -94,6 +96,11 @@ static pb_status read_coordinate(pb_lines *in, pb_matrix_build *b, size_t count)
     if (row < 1 || col < 1 || (size_t)row > f->rows || (size_t)col > f->cols)
       return pb_lines_fail(in, "entry (%jd, %jd) lies outside the %zu × %zu matrix", (intmax_t)row,
                            (intmax_t)col, f->rows, f->cols);
+    upper |= row < col;
+    lower |= row > col;
+    if (symmetric && upper && lower)
+      return pb_lines_fail(in, "entry (%jd, %jd) of a symmetric matrix, stored by its %s triangle",
+                           (intmax_t)row, (intmax_t)col, row < col ? "lower" : "upper");
     pb_status st = pb_matrix_build_add(b, row - 1, col - 1, value, in->err);
     if (st) return st;
   }
@@ -128,7 +135,8 @@ pb_status pb_read_matrix_market(pb_lines *in, const char *name, pb_matrix_build 
   b->file->half = form.symmetric;
   if (!st) st = pb_matrix_build_reserve(b, count + 1, in->err);
   if (!st)
-    st = form.array ? read_array(in, b, form.symmetric, count) : read_coordinate(in, b, count);
+    st = form.array ? read_array(in, b, form.symmetric, count)
+                    : read_coordinate(in, b, form.symmetric, count);
   if (!st && next_line(in, b->file))
     st = pb_lines_fail(in, "more than the %zu entries that the header announces", count);
   return st ? st : in->status;

@@ -14,7 +14,7 @@
 
 #include "part/matrix_build.h"
 
-enum { FIELDS = 10, WIDTH = 17 };
+enum { FIELDS = 10, WIDTH = 48 };
 
 typedef struct card {
   char field[FIELDS][WIDTH];
@@ -22,23 +22,25 @@ typedef struct card {
   bool large;
 } card;
 
-static void take_field(card *c, const char *from, size_t length) {
-  while (length && (*from == ' ' || *from == '\t')) from++, length--;
-  while (length && (from[length - 1] == ' ' || from[length - 1] == '\t')) length--;
-  if (length > WIDTH - 1) length = WIDTH - 1;
+// false: it does not fit; half a number would be another number.
+static bool take_field(card *c, const char *from, size_t length) {
+  while (length && *from == ' ') from++, length--;
+  while (length && from[length - 1] == ' ') length--;
+  if (length > WIDTH - 1) return false;
   memcpy(c->field[c->fields], from, length);
   c->field[c->fields++][length] = 0;
+  return true;
 }
 
+// Ten fields, of which the last is a mark of continuation.
 static bool split_free(card *c, const char *text) {
   while (c->fields < FIELDS) {
     size_t length = strcspn(text, ",");
-    if (length > 32) return false;
-    take_field(c, text, length);
+    if (!take_field(c, text, length)) return false;
     if (!text[length]) return true;
     text += length + 1;
   }
-  return true;
+  return pb_scan_done(text);
 }
 
 // A small field card has ten fields of 8 columns, a large one six, of which the middle four are 16.
@@ -46,10 +48,7 @@ static bool split_card(const char *text, card *c) {
   *c = (card){0};
   size_t length = strlen(text), first = length < 8 ? length : 8;
   if (strchr(text, '\t')) return false;
-  if (strchr(text, ',')) {
-    split_free(c, text);
-    return strchr(c->field[0], '*') == NULL;
-  }
+  if (strchr(text, ',')) return split_free(c, text) && !strchr(c->field[0], '*');
   take_field(c, text, first);
   c->large = strchr(c->field[0], '*') != NULL;
   size_t width = c->large ? 16 : 8;
@@ -166,7 +165,8 @@ static pb_status read_column(punch *p, const card *c) {
 static pb_status read_card(punch *p) {
   card c;
   if (!split_card(p->in->text, &c))
-    return pb_lines_fail(p->in, "tabs, or fields that are too long");
+    return pb_lines_fail(
+        p->in, "tabs, large fields apart by commas, or fields that are too long or too many");
   bool continuation = !c.field[0][0] || c.field[0][0] == '+' || c.field[0][0] == '*';
   if (continuation && p->other) return PB_OK;
   if (continuation)

@@ -140,9 +140,9 @@ static pb_status read_node_table(pb_lines *in, node_list *list) {
 // An n × 3 array of a Matrix Market or MAT file: nodes 1 … n.
 static pb_status take_array(const char *path, const pb_matrix_file *f, node_list *list,
                             pb_error *err) {
-  if (f->cols != 3 || f->rows > 100000000)
-    return pb_fail(err, PB_ERR_SYNTAX, path, "is %zu × %zu, expected n × 3 coordinates", f->rows,
-                   f->cols);
+  if (f->cols != 3 || f->rows > 100000000 || f->half)
+    return pb_fail(err, PB_ERR_SYNTAX, path, "is %s%zu × %zu, expected n × 3 coordinates",
+                   f->half ? "symmetric, " : "", f->rows, f->cols);
   static const double origin[3];
   pb_status st = PB_OK;
   for (size_t i = 0; !st && i < f->rows; i++) st = add_node(list, (int64_t)i + 1, origin, err);
@@ -207,6 +207,18 @@ pb_status pb_node_file_read(const char *path, pb_node_file *out, pb_error *err) 
   if (!st) st = take_nodes(path, &list, out, err);
   free(list.row);
   return st;
+}
+
+size_t pb_node_index(const int64_t *number, size_t count, int64_t wanted) {
+  size_t low = 0, high = count;
+  while (low < high) {
+    size_t middle = (low + high) / 2;
+    if (number[middle] < wanted)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  return low < count && number[low] == wanted ? low : SIZE_MAX;
 }
 
 void pb_node_file_clear(pb_node_file *file) {

@@ -55,7 +55,8 @@ typedef struct pb_reduction {
   size_t full_dof;        // rows of the full K
   size_t factor_entries;  // of the Cholesky factor
   double seconds[PB_REDUCE_PHASES];
-  double rigid_residual;  // ‖K R‖ relative to K's own size, R the six rigid motions of the element
+  double rigid_residual;  // ‖K R‖ relative to K's own size (of a single frame, whose K vanishes, to
+                          // M's at the first mode), R the six rigid motions of the element
   double mass, full_mass;  // kg: RᵀMR of the element; of the full model
   double proven_hz;  // all modes below are kept, by a count of the full model's; 0: not counted
   size_t checks;
@@ -66,7 +67,7 @@ const char *pb_reduce_phase_name(pb_reduce_phase phase);
 
 // Reduces fem to its frames. keep_shapes: also fill *shape (dof × size doubles). *out is owned by
 // the caller. Fails with PB_ERR_MEMORY; PB_ERR_ARGUMENT (no frame, a frame whose nodes lie on a
-// line, two rigid frames that share a node, a node set without DoFs); PB_ERR_SINGULAR (the part
+// line, two rigid frames that share a node, a frame's node without DoFs); PB_ERR_SINGULAR (the part
 // falls into pieces or has a mechanism: the message names a node); PB_ERR_NUMERIC (modes not
 // found); PB_ERR_STATE (stopped). [init]
 pb_status pb_reduce(const pb_fem *fem, const pb_reduce_options *options, bool keep_shapes,

@@ -46,12 +46,15 @@ static pb_status map_rows(reduce_work *w, pb_error *err) {
   for (size_t r = 0; r < w->full; r++) {
     if (w->node_of_row[r] == SIZE_MAX)
       return pb_fail(err, PB_ERR_ARGUMENT, fem->name, "row %zu of K belongs to no node", r + 1);
-    int64_t last = fem->k.start[r + 1] - 1;
-    bool diagonal = last >= fem->k.start[r] && fem->k.row[last] == (int64_t)r;
-    if (!diagonal || !(fem->k.value[last] > 0))
+    int64_t node = pb_fem_node_number(fem, w->node_of_row[r]);
+    if (!(pb_sparse_diagonal(&fem->k, r) > 0))
       return pb_fail(err, PB_ERR_SINGULAR, fem->name,
                      "row %zu of K (node %" PRId64 ") has no positive diagonal: nothing holds it",
-                     r + 1, pb_fem_node_number(fem, w->node_of_row[r]));
+                     r + 1, node);
+    if (pb_sparse_diagonal(&fem->m, r) < 0)
+      return pb_fail(err, PB_ERR_ARGUMENT, fem->name,
+                     "row %zu of M (node %" PRId64 ") has a negative diagonal: %g", r + 1, node,
+                     pb_sparse_diagonal(&fem->m, r));
   }
   return PB_OK;
 }
@@ -167,17 +170,19 @@ static pb_status tie_rigid(reduce_work *w, const reduce_frame *f, pb_error *err)
   return st;
 }
 
+// A node without rows would count as one that stays where it is.
 static pb_status check_frame(const pb_fem *fem, const pb_fem_frame *frame, pb_error *err) {
-  size_t rows = 0;
+  if (!frame->nodes) return pb_fail(err, PB_ERR_ARGUMENT, frame->name, "has no nodes");
   for (size_t i = 0; i < frame->nodes; i++) {
     if (frame->node[i] >= fem->nodes)
       return pb_fail(err, PB_ERR_ARGUMENT, frame->name, "the model has no node of index %zu",
                      frame->node[i]);
-    for (size_t d = 0; d < 3; d++) rows += fem->dof[d + 3 * frame->node[i]] >= 0;
+    const int64_t *dof = fem->dof + 3 * frame->node[i];
+    if (dof[0] < 0 && dof[1] < 0 && dof[2] < 0)
+      return pb_fail(err, PB_ERR_ARGUMENT, frame->name,
+                     "node %" PRId64 " cannot move: K has no row for it",
+                     pb_fem_node_number(fem, frame->node[i]));
   }
-  if (!rows)
-    return pb_fail(err, PB_ERR_ARGUMENT, frame->name,
-                   frame->nodes ? "K has no row for any of the frame's nodes" : "has no nodes");
   return PB_OK;
 }
 

@@ -73,6 +73,9 @@ pb_status reduce_choose_pins(reduce_work *w, pb_error *err);
 pb_status reduce_mass_detect(reduce_work *w, pb_error *err);
 void reduce_mass_multiply(const reduce_work *w, size_t columns, const double *x, double *y);
 
+// reduce_factor.c: w->factor, of K without held rows. PB_ERR_SINGULAR where it has a mechanism.
+pb_status reduce_factor(reduce_work *w, pb_error *err);
+
 // reduce_border.c: factorisation and constraint modes; then u ← the response to forces u with every
 // frame held.
 pb_status reduce_static(reduce_work *w, pb_error *err);

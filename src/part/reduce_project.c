@@ -40,6 +40,15 @@ static void rigid_motions(const reduce_work *w, double *r) {
   }
 }
 
+// Stiffness by which a row's forces are judged: K's own, or, of a single frame, whose K is zero but
+// for rounding, what moves its mass at the first mode.
+static double own_stiffness(const reduce_work *w, size_t i) {
+  const pb_reduction *out = w->out;
+  double first = w->modes ? w->omega2[0] : isfinite(w->next_omega2) ? w->next_omega2 : 0;
+  size_t at = i * (out->size + 1);
+  return fmax(out->k[at], first * out->m[at]);
+}
+
 // Largest |K R| against √(K_ii · RᵀR weighted by K's diagonal): free of units.
 static void measure_rigid(const reduce_work *w, const double *r) {
   pb_reduction *out = w->out;
@@ -48,11 +57,11 @@ static void measure_rigid(const reduce_work *w, const double *r) {
   for (size_t c = 0; c < 6; c++) {
     const double *motion = r + c * b;
     double size = 0;
-    for (size_t i = 0; i < b; i++) size += out->k[i + i * m] * motion[i] * motion[i];
+    for (size_t i = 0; i < b; i++) size += own_stiffness(w, i) * motion[i] * motion[i];
     for (size_t i = 0; i < b; i++) {
       double force = 0;
       for (size_t j = 0; j < b; j++) force += out->k[i + j * m] * motion[j];
-      double scale = sqrt(size * out->k[i + i * m]);
+      double scale = sqrt(size * own_stiffness(w, i));
       out->rigid_residual = fmax(out->rigid_residual, scale > 0 ? fabs(force) / scale : 0);
     }
   }

@@ -22,6 +22,12 @@ typedef struct pb_sparse {
 pb_status pb_sparse_from_entries(size_t n, size_t count, const int64_t *row, const int64_t *col,
                                  const double *value, pb_sparse *out, pb_error *err);
 
+// The j-th entry of the diagonal; 0 where none is stored. [any]
+static inline double pb_sparse_diagonal(const pb_sparse *a, size_t j) {
+  int64_t last = a->start[j + 1] - 1;
+  return last >= a->start[j] && a->row[last] == (int64_t)j ? a->value[last] : 0;
+}
+
 // y ← A x for `columns` columns, x and y n × columns with leading dimension n. [any]
 void pb_sparse_multiply(const pb_sparse *a, size_t columns, const double *x, double *y);
 

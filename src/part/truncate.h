@@ -45,9 +45,9 @@ typedef struct pb_truncation {
   double worst_zero, worst_pole;
 } pb_truncation;
 
-// *out is owned by the caller. Fails with PB_ERR_ARGUMENT (frames, band, no modes to drop),
-// PB_ERR_ELEMENT (M not positive definite, the interior not held by its frames), PB_ERR_NUMERIC,
-// PB_ERR_MEMORY. [init]
+// *out is owned by the caller. Fails as pb_element_new does (matrices that are not symmetric, M not
+// positive definite), and with PB_ERR_ARGUMENT (frames, band, no modes to drop), PB_ERR_ELEMENT
+// (the interior not held by its frames), PB_ERR_NUMERIC, PB_ERR_MEMORY. [init]
 pb_status pb_element_truncate(const char *name, const pb_element_data *data,
                               const pb_truncate_options *options, pb_truncation *out,
                               pb_error *err);

@@ -15,6 +15,10 @@ static pb_status check_shapes(const pb_mat_array *k, const pb_mat_array *m, cons
   if (xyz->cols != 3)
     return pb_fail(err, PB_ERR_SYNTAX, file, "int_xyz is %zu × %zu; expected n × 3", xyz->rows,
                    xyz->cols);
+  if (k->rows < 6 * xyz->rows)
+    return pb_fail(err, PB_ERR_SYNTAX, file,
+                   "%zu × %zu matrices do not fit %zu interface frames (6 each, then modes)",
+                   k->rows, k->rows, xyz->rows);
   return PB_OK;
 }
 

@@ -88,6 +88,10 @@ static void test_picture(void **state) {
   }
   assert_true(polygons > 150);
   assert_non_null(strstr(mode, "mode 1 at"));
+  assert_int_equal(part_run("build " JOINT " --mesh 0.5 --picture n.svg --set '/name=a<b & c'"), 0);
+  char *named = part_text("n.svg");
+  assert_non_null(strstr(named, ">a&#60;b &#38; c: "));
+  free(named);
   assert_string_not_equal(strstr(rest, "<polygon"), strstr(mode, "<polygon"));
   free(rest);
   free(mode);
@@ -99,7 +103,11 @@ static void test_png(void **state) {
     print_message("skipped: gnuplot is not installed\n");
     skip();
   }
-  assert_int_equal(part_run("build " JOINT " --mesh 0.5 --picture joint.png"), 0);
+  // The name is no command of gnuplot, whatever it holds.
+  assert_int_equal(part_run("build " JOINT " --mesh 0.5 --picture joint.png "
+                            "--set \"/name=it's'; system('touch made') #\""),
+                   0);
+  assert_int_equal(access(part_path("made"), F_OK), -1);
   char *png = part_text("joint.png");
   assert_memory_equal(png, "\x89PNG", 4);
   free(png);
@@ -114,6 +122,7 @@ static void test_messages(void **state) {
   assert_int_equal(part_run("build " JOINT " --picture a.gif"), 2);
   assert_int_equal(part_run("build " JOINT " --set neck"), 2);
   assert_int_equal(part_run("build " JOINT " --convergence -o x.mat"), 2);
+  assert_int_equal(part_run("build " JOINT " --sweep /dimensions/neck=thin,thick"), 2);
   assert_int_equal(part_run("build " JOINT " --set /dimensions/nek=1"), 1);
   part_complains("/dimensions/nek");
   assert_int_equal(part_run("build " JOINT " --set /dimensions/neck=0"), 1);

@@ -1,6 +1,8 @@
 // plantbus-part import, doctor and truncate as a user runs them, and the health that
 // plantbus-model check tells.
 
+#include <matio.h>
+
 #include "base/json.h"
 #include "part/part_run.h"
 #include "plant/element.h"
@@ -147,6 +149,86 @@ static void test_truncate(void **state) {
                    1);
 }
 
+static void add_variable(mat_t *mat, const char *name, size_t rows, size_t cols, double *x) {
+  size_t size[2] = {rows, cols};
+  matvar_t *v = Mat_VarCreate(name, MAT_C_DOUBLE, MAT_T_DOUBLE, 2, size, x, 0);
+  assert_non_null(v);
+  assert_int_equal(Mat_VarWrite(mat, v, MAT_COMPRESSION_NONE), 0);
+  Mat_VarFree(v);
+}
+
+// size < OUTSIDE_SIZE: not all rows; half: the upper triangle only.
+static void write_own(const char *name, size_t size, bool half) {
+  static double k[OUTSIDE_SIZE * OUTSIDE_SIZE], m[OUTSIDE_SIZE * OUTSIDE_SIZE];
+  double xyz[3 * OUTSIDE_FRAMES];
+  for (size_t j = 0; j < size; j++) {
+    for (size_t i = 0; i < size; i++) {
+      k[i + j * size] = half && i > j ? 0 : outside_entry(element.k, i, j);
+      m[i + j * size] = half && i > j ? 0 : outside_entry(element.m, i, j);
+    }
+  }
+  for (size_t f = 0; f < OUTSIDE_FRAMES; f++)
+    for (size_t a = 0; a < 3; a++) xyz[f + a * OUTSIDE_FRAMES] = element.position[a + 3 * f];
+  mat_t *mat = Mat_CreateVer(part_path(name), NULL, MAT_FT_MAT5);
+  assert_non_null(mat);
+  add_variable(mat, "K", size, size, k);
+  add_variable(mat, "M", size, size, m);
+  add_variable(mat, "int_xyz", OUTSIDE_FRAMES, 3, xyz);
+  Mat_Close(mat);
+}
+
+// Matrices that are too small for the frames, down to a single number: refused by all commands.
+static void test_small_matrices(void **state) {
+  (void)state;
+  static const char *const command[] = {"doctor", "import", "truncate --band 0,1000"};
+  for (size_t size = 1; size <= 13; size += 4) {
+    write_own("small.mat", size, false);
+    for (size_t k = 0; k < 3; k++) {
+      char line[100];
+      snprintf(line, sizeof line, "%s small.mat", command[k]);
+      assert_int_equal(part_run(line), 1);
+      part_complains("do not fit 3 interface frames");
+    }
+  }
+}
+
+// An element's own file by one triangle: mirrored where --half says so, else never used as it is.
+static void test_half(void **state) {
+  (void)state;
+  write_own("half.mat", OUTSIDE_SIZE, true);
+  assert_int_equal(part_run("import half.mat -o whole.mat"), 1);
+  part_complains("not symmetric");
+  assert_int_equal(part_run("truncate half.mat --band 0,1000 --modes 1 -o whole.mat"), 1);
+  part_complains("not symmetric");
+  assert_int_equal(part_run("import half.mat --half -o whole.mat"), 0);
+  pb_element *e = load("whole.mat");
+  for (size_t j = 0; j < e->size; j++)
+    for (size_t i = 0; i < e->size; i++)
+      ASSERT_NEAR(e->k[i + j * e->size], outside_entry(element.k, i, j), 0);
+  pb_element_free(e);
+  assert_int_equal(part_run("import whole.mat --half"), 1);
+  part_complains("both sides of the diagonal");
+}
+
+// What cannot be written is neither said to be written nor a success.
+static void test_full_disk(void **state) {
+  (void)state;
+  write_pair("print.txt");
+  outside_write_listing(part_path("list.txt"), &element, 50, 0, 1);
+  assert_int_equal(part_run("doctor K.txt M.txt list.txt --repair -o none/cured.mat"), 1);
+  part_complains("none/cured.mat");
+  char *said = part_text("stdout");
+  assert_non_null(strstr(said, "few-digits"));
+  assert_null(strstr(said, "written"));
+  free(said);
+  assert_int_equal(part_run("doctor K.txt M.txt list.txt --repair -o none/cured.mat --json"), 1);
+  said = part_text("stdout");
+  assert_non_null(strstr(said, "\"repaired\": false"));
+  free(said);
+  assert_int_equal(part_shell(PB_BIN "/plantbus-part import K.txt M.txt list.txt >/dev/full"), 1);
+  part_complains("standard output: cannot be written");
+}
+
 static void write_plant(const char *file) {
   FILE *f = fopen(part_path("plant.json"), "w");
   assert_non_null(f);
@@ -193,7 +275,8 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_import),      cmocka_unit_test(test_messages),
       cmocka_unit_test(test_doctor),      cmocka_unit_test(test_truncate),
-      cmocka_unit_test(test_model_check),
+      cmocka_unit_test(test_model_check), cmocka_unit_test(test_small_matrices),
+      cmocka_unit_test(test_half),        cmocka_unit_test(test_full_disk),
   };
   return cmocka_run_group_tests(tests, begin, part_folder_remove);
 }

@@ -212,8 +212,10 @@ static void test_messages(void **state) {
       {"%%MatrixMarket matrix coordinate real general\n1 1 1\n1 1 1e999\n", ":3", "expected"},
       {"%%MatrixMarket matrix coordinate real general\n1 1 1\n1 1 nan\n", ":3", "expected"},
       {"%%MatrixMarket matrix coordinate real general\n1 1 1\n1 1 0x10\n", ":3", "expected"},
+      {"%%MatrixMarket matrix coordinate real symmetric\n2 2 4\n1 1 1\n2 2 5\n1 2 1\n2 1 1\n", ":6",
+       "stored by its upper triangle"},
       {"MAT_K:\n[ 1, 1]: 1.0 [ 1, 2]: 2.0\n[ 2, 1]: 2.0 [ 2, 2] 3.0\n", ":3", "expected entries"},
-      {"MAT_K:\n[ 1, 1]: 1.0 [ 1, 2]: 2.0\n[ 2, 1]: 2.0 [ 2, 1]: 3.0\n", "", "follows on"},
+      {"MAT_K:\n[ 1, 1]: 1.0 [ 1, 2]: 2.0\n[ 2, 1]: 2.0 [ 2, 1]: 3.0\n", ":3", "follows on"},
       {"MAT_K:\n[1,1]: 1.0\nMAT_K:\n[1,1]: 1.0\n", ":3", "second matrix"},
       {"1 1  1.0000000000000e+00\n1 2  1.0000000000000e+00\n1 3  1.0000000000000e+00\n", ":3",
        "lines are missing"},
@@ -231,7 +233,13 @@ static void test_messages(void **state) {
       {"DMIG    KAAX           0       6       2       0\n"
        "DNIG*   KAAX                           1               1\n",
        ":2", "unknown entry"},
+      {"DMIG,KAAX,0,6,2,0\n"
+       "DMIG,KAAX,1,1,,1,1,1.00000000000000000000000000000000000000000000001E+07\n",
+       ":2", "too long"},
+      {"DMIG,KAAX,0,6,2,0\nDMIG,KAAX,1,1,,1,1,5.0,,+A,6.0\n", ":2", "too many"},
       {"1,1, 1,1, 5.0\n1,2, 1,9, 5.0\n", ":2", "direction"},
+      {"*USER ELEMENT, NODES= 2, LINEAR\n** ELEMENT NODES\n** 1,2\n1,2\n1,3\n", ":5",
+       "place of a node"},
       {"*USER ELEMENT, NODES= 2, LINEAR\n** ELEMENT NODES\n** 1\n1,2\n*MATRIX,TYPE=MASS\n1.0\n",
        ":4", "1 of 2 node numbers"},
       {"*USER ELEMENT, NODES= 1, LINEAR\n** ELEMENT NODES\n** 1\n1,2\n*MATRIX,TYPE=MASS\n1.0, "
@@ -261,6 +269,46 @@ static void test_messages(void **state) {
   assert_int_equal(pb_matrix_file_read(folder, NULL, &f, &err), PB_ERR_IO);
 }
 
+// Numbers as long as a free field may be: a cut exponent would be another number.
+static void test_long_fields(void **state) {
+  (void)state;
+  const char *path = in_folder("long.pch");
+  pb_matrix_file f;
+  write_text(path, "DMIG,KAAX,0,6,2,0\nDMIG,KAAX,1,1,,1,1,1.2780705243E+007\n"
+                   "DMIG,KAAX,2,1,,2,1,-1.278070524339920000E-07,\n,3,1,2.5,,4,1,-3.5-3\n");
+  REQUIRE(pb_matrix_file_read(path, "K", &f, &err));
+  assert_int_equal(f.count, 4);
+  ASSERT_NEAR(f.value[0], 1.2780705243e7, 0);
+  ASSERT_NEAR(f.value[1], -1.27807052433992e-7, 0);
+  ASSERT_NEAR(f.value[3], -3.5e-3, 0);
+  pb_matrix_file_clear(&f);
+}
+
+// The line is told however long the path is.
+static void test_long_path(void **state) {
+  (void)state;
+  char path[600];
+  int at = snprintf(path, sizeof path, "%s", folder);
+  while (at < 400) at += snprintf(path + at, sizeof path - (size_t)at, "/.");
+  snprintf(path + at, sizeof path - (size_t)at, "/far.mtx");
+  write_text(path, "%%MatrixMarket matrix coordinate real general\n1 1 1\n1 1 x\n");
+  pb_matrix_file f;
+  pb_error why = {0};
+  assert_int_equal(pb_matrix_file_read(path, NULL, &f, &why), PB_ERR_SYNTAX);
+  assert_non_null(strstr(why.where, "/far.mtx:3"));
+}
+
+// Coordinates are no symmetric matrix: the half that is not stored would be zero.
+static void test_symmetric_nodes(void **state) {
+  (void)state;
+  const char *path = in_folder("nodes.mtx");
+  pb_node_file nodes;
+  pb_error why = {0};
+  write_text(path, "%%MatrixMarket matrix array real symmetric\n3 3\n1\n4\n2\n5\n3\n6\n");
+  assert_int_equal(pb_node_file_read(path, &nodes, &why), PB_ERR_SYNTAX);
+  assert_non_null(strstr(why.message, "symmetric, 3 × 3"));
+}
+
 static void test_symmetry(void **state) {
   (void)state;
   static const struct {
@@ -269,8 +317,6 @@ static void test_symmetry(void **state) {
       {"%%MatrixMarket matrix coordinate real general\n2 2 3\n1 1 1\n2 2 5\n1 2 1\n", "one side"},
       {"%%MatrixMarket matrix coordinate real general\n2 2 4\n1 1 1\n2 2 5\n1 2 1\n2 1 1.1\n",
        "entry (1, 2) is 1"},
-      {"%%MatrixMarket matrix coordinate real symmetric\n2 2 4\n1 1 1\n2 2 5\n1 2 1\n2 1 1\n",
-       "in both"},
       {"%%MatrixMarket matrix coordinate real general\n2 3 1\n1 1 1\n", "not square"},
   };
   for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++) {
@@ -408,11 +454,12 @@ static int end(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_round_trip),   cmocka_unit_test(test_both_in_one),
-      cmocka_unit_test(test_truncation),   cmocka_unit_test(test_mutation),
-      cmocka_unit_test(test_messages),     cmocka_unit_test(test_symmetry),
-      cmocka_unit_test(test_listings),     cmocka_unit_test(test_node_forms),
-      cmocka_unit_test(test_broken_nodes),
+      cmocka_unit_test(test_round_trip),      cmocka_unit_test(test_both_in_one),
+      cmocka_unit_test(test_truncation),      cmocka_unit_test(test_mutation),
+      cmocka_unit_test(test_messages),        cmocka_unit_test(test_symmetry),
+      cmocka_unit_test(test_long_fields),     cmocka_unit_test(test_long_path),
+      cmocka_unit_test(test_symmetric_nodes), cmocka_unit_test(test_listings),
+      cmocka_unit_test(test_node_forms),      cmocka_unit_test(test_broken_nodes),
   };
   return cmocka_run_group_tests(tests, begin, end);
 }

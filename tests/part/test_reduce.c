@@ -136,7 +136,12 @@ static void test_all_modes(void **state) {
     assert_true(r->check[i].error < 1e-8);
   }
   pb_reduction_free(r);
-  options.modes = count + 1;
+  // Without any limit as well: what rounding adds to the last block is no mode.
+  options = (pb_reduce_options){.max_hz = 1e12};
+  REQUIRE(pb_reduce(&fem, &options, false, &r, &err));
+  assert_int_equal(r->modes, count);
+  pb_reduction_free(r);
+  options = (pb_reduce_options){.modes = count + 1};
   pb_error err = {0};
   assert_int_equal(pb_reduce(&fem, &options, false, &r, &err), PB_ERR_ARGUMENT);
   assert_null(r);
@@ -231,6 +236,82 @@ static void test_many_equal(void **state) {
   pb_fem_clear(&fem);
 }
 
+// One mode of an equal pair is kept, the other is not: no count can be made at the cut, so it is
+// made below, and nothing is missing.
+static void test_cut_pair(void **state) {
+  (void)state;
+  pb_fem fem;
+  size_t cuts = 0;
+  assert_int_equal(bar_build(0.1, 0.01, 6, 2, &fem), 0);
+  assert_int_equal(truss_frame(&fem, "left", PB_TIE_RIGID, 0, -1e-9, 1e-9), 0);
+  assert_int_equal(truss_frame(&fem, "right", PB_TIE_RIGID, 0, 0.1 - 1e-9, 0.1 + 1e-9), 0);
+  pb_reduce_options options = {.max_hz = 60e3};
+  pb_reduction *all = NULL;
+  REQUIRE(pb_reduce(&fem, &options, false, &all, &err));
+  assert_true(all->modes > 8);
+  for (size_t p = 1; p < all->modes; p++) {
+    bool cut = all->fixed_hz[p] < (1 + 1e-8) * all->fixed_hz[p - 1];
+    options = (pb_reduce_options){.modes = p, .prove = true};
+    pb_reduction *r = NULL;
+    REQUIRE(pb_reduce(&fem, &options, false, &r, &err));
+    assert_int_equal(r->modes, p);
+    ASSERT_RELATIVE(r->fixed_hz[p - 1], all->fixed_hz[p - 1], 1e-9);
+    assert_true(r->proven_hz > 0);
+    assert_true((r->proven_hz < r->fixed_hz[p - 1]) == cut);
+    cuts += cut;
+    pb_reduction_free(r);
+  }
+  assert_true(cuts >= 2);
+  pb_reduction_free(all);
+  pb_fem_clear(&fem);
+}
+
+// Masses that M does not have carry no modes: a limit above all there are finds those there are.
+static void test_massless(void **state) {
+  (void)state;
+  pb_fem fem;
+  assert_int_equal(truss_build(25, 0.6, true, 11, &fem), 0);
+  assert_int_equal(truss_frame(&fem, "left", PB_TIE_RIGID, 0, 0, 0.3), 0);
+  assert_int_equal(truss_frame(&fem, "right", PB_TIE_RIGID, 0, 0.7, 1), 0);
+  assert_int_equal(truss_hang(&fem, 2, fem.frame[0].node[0], 20, 0), 0);
+  pb_reduce_options options = {.max_hz = 1e12};
+  pb_reduction *r = NULL;
+  size_t between = 0;
+  for (size_t i = 0; i < 25; i++) between += fem.xyz[3 * i] > 0.3 && fem.xyz[3 * i] < 0.7;
+  REQUIRE(pb_reduce(&fem, &options, false, &r, &err));
+  assert_int_equal(r->modes, 3 * between);
+  pb_reduction_free(r);
+  // No mass at all: no mode, though K is there.
+  for (int64_t e = 0; e < fem.m.start[fem.m.n]; e++) fem.m.value[e] = 0;
+  REQUIRE(pb_reduce(&fem, &options, false, &r, &err));
+  assert_int_equal(r->modes, 0);
+  pb_reduction_free(r);
+  pb_error why = {0};
+  options = (pb_reduce_options){.modes = 3};
+  assert_int_equal(pb_reduce(&fem, &options, false, &r, &why), PB_ERR_ARGUMENT);
+  assert_non_null(strstr(why.message, "the model has 0"));
+  pb_fem_clear(&fem);
+}
+
+// The stiffness of a single frame is zero but for rounding, which is no resistance; a spring to the
+// ground is one.
+static void test_one_frame(void **state) {
+  (void)state;
+  pb_fem fem;
+  pb_reduction *r = NULL;
+  pb_reduce_options options = {.modes = 4};
+  assert_int_equal(truss_build(40, 0.5, true, 5, &fem), 0);
+  assert_int_equal(truss_frame(&fem, "only", PB_TIE_AVERAGED, 0, 0, 0.4), 0);
+  REQUIRE(pb_reduce(&fem, &options, false, &r, &err));
+  assert_true(r->rigid_residual < 1e-9);
+  pb_reduction_free(r);
+  fem.k.value[fem.k.start[1] - 1] *= 1.01;
+  REQUIRE(pb_reduce(&fem, &options, false, &r, &err));
+  assert_true(r->rigid_residual > 1e-5);
+  pb_reduction_free(r);
+  pb_fem_clear(&fem);
+}
+
 static void expect_refusal(const pb_fem *fem, pb_status status, const char *says) {
   pb_reduce_options options = {.modes = 3};
   pb_reduction *r = NULL;
@@ -266,6 +347,16 @@ static void test_refusals(void **state) {
   expect_refusal(&fem, PB_ERR_ARGUMENT, "two rigid frames");
   truss_drop_frame(&fem);
   truss_drop_frame(&fem);
+  // A node that no row belongs to, as the points of a geometry are.
+  fem.nodes++;
+  fem.xyz = realloc(fem.xyz, 3 * fem.nodes * sizeof *fem.xyz);
+  fem.dof = realloc(fem.dof, 3 * fem.nodes * sizeof *fem.dof);
+  assert_true(fem.xyz && fem.dof);
+  for (size_t i = 3 * fem.nodes - 3; i < 3 * fem.nodes; i++) fem.xyz[i] = 0.1, fem.dof[i] = -1;
+  static const size_t lost[4] = {4, 9, 11, 30};
+  assert_int_equal(truss_frame_of(&fem, "lost", PB_TIE_AVERAGED, origin, lost, 4, NULL), 0);
+  expect_refusal(&fem, PB_ERR_ARGUMENT, "node 31 cannot move");
+  truss_drop_frame(&fem);
   int64_t kept = fem.dof[5];
   fem.dof[5] = fem.dof[6];
   expect_refusal(&fem, PB_ERR_ARGUMENT, "another node's");
@@ -276,6 +367,16 @@ static void test_refusals(void **state) {
   fem.m.value[3] = NAN;
   expect_refusal(&fem, PB_ERR_ARGUMENT, "not finite");
   fem.m.value[3] = value;
+  double *last = &fem.m.value[fem.m.start[8] - 1];
+  value = *last;
+  *last = -1;
+  expect_refusal(&fem, PB_ERR_ARGUMENT, "row 8 of M (node 3) has a negative diagonal");
+  *last = 0;  // a massless row is none
+  pb_reduction *r = NULL;
+  pb_reduce_options options = {.modes = 3};
+  REQUIRE(pb_reduce(&fem, &options, false, &r, &err));
+  pb_reduction_free(r);
+  *last = value;
   pb_fem_clear(&fem);
 }
 
@@ -368,6 +469,8 @@ int main(void) {
       cmocka_unit_test(test_mass_beyond), cmocka_unit_test(test_many_equal),
       cmocka_unit_test(test_refusals),    cmocka_unit_test(test_mechanisms),
       cmocka_unit_test(test_stop),        cmocka_unit_test(test_square_bar),
+      cmocka_unit_test(test_cut_pair),    cmocka_unit_test(test_massless),
+      cmocka_unit_test(test_one_frame),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -56,7 +56,8 @@ static void write_nodes(const pb_fem *fem) {
   fprintf(deck, "*NSET, NSET=LEFT\n");
   for (size_t i = 0; i < fem->frame[0].nodes; i++)
     fprintf(deck, "%ld,%s", number_of(fem->frame[0].node[i]), i % 5 == 4 ? "\n" : " ");
-  fprintf(deck, "\n*nset, generate, nset = Range\n10, 40, 3\n*STEP\n1, 2, 3\n");
+  fprintf(deck, "\n*nset, generate, nset = Range\n10, 40, 3\n"
+                "*NSET, NSET=ENDLESS, GENERATE\n1, 9000000000000000000, 5\n*STEP\n1, 2, 3\n");
   fclose(f);
   fclose(mm);
   fclose(deck);
@@ -342,6 +343,13 @@ static void test_refusals(void **state) {
          1, "/a/weights");
   refuse(FILES "--modes 3 --frame 'a={\"nodes\":[10,13,16],\"origin\":[0,0,0],\"tie\":\"loose\"}'",
          1, "/a/tie");
+  refuse(FILES "--modes 3 --sets @deck.inp --frame 'a={\"set\":\"endless\",\"origin\":[0,0,0]}'", 1,
+         "a range of more than");
+  FILE *f = create("sparse.mtx");
+  fprintf(f, "%%%%MatrixMarket matrix coordinate real symmetric\n4000000000 4000000000 1\n1 1 1\n");
+  fclose(f);
+  refuse("@sparse.mtx @sparse.mtx --nodes @nodes.csv --frames @list.json --modes 3", 1,
+         "rows without any stiffness");
   refuse("@K.sti @K.mas --nodes @out.int_xyz.mtx --frames @list.json --modes 3", 1,
          "belongs to node");
   refuse("@K.mtx @M.mtx --nodes @out.int_xyz.mtx --frames @list.json --modes 3", 1,
