@@ -15,7 +15,3 @@ target_link_options(fault_import PRIVATE -Wl,--wrap=malloc,--wrap=calloc,--wrap=
 pb_test(part_import_tool LABELS e2e SOURCES test_import_tool.c part_run.c ../support/outside.c
         ../support/beam.c LIBS plantbus_part cjson PkgConfig::MATIO)
 add_dependencies(part_import_tool plantbus-part plantbus-model)
-
-# Small problems: more than one thread of the BLAS only waits.
-set_tests_properties(part_truncate part_element_doctor part_import_tool fault_import PROPERTIES
-                     ENVIRONMENT "OPENBLAS_NUM_THREADS=1")
