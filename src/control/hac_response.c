@@ -5,6 +5,8 @@
 #include "control/hac.h"
 #include "control/lti_ops.h"
 
+enum { AT_ONCE = 64 };  // frequencies
+
 void pb_hac_transform(size_t n, const double *left, const double *right, const double complex *m,
                       double complex *out) {
   for (size_t r = 0; r < n; r++) {
@@ -25,17 +27,20 @@ pb_status pb_hac_plant(const pb_model *model, const pb_hac_channels *channels,
                        const double *hz, size_t nf, double complex *h, pb_error *err) {
   size_t n = channels->n, all = model->ny * model->nu;
   pb_loop loop = {model, iff, channels->sensor, channels->input, 1, delay};
-  double complex *full = malloc((all + 1) * sizeof *full);
+  double complex *full = malloc((AT_ONCE * all + 1) * sizeof *full);
   double complex *work = malloc((n * n + 1) * sizeof *work);
   pb_status status = full && work ? PB_OK : pb_fail_memory(err, "hac");
-  for (size_t f = 0; f < nf && status == PB_OK; f++) {
-    status = iff ? pb_loop_frf(&loop, 1, &hz[f], 1, full, err)
-                 : pb_model_frf(model, PB_SAMPLED, &hz[f], 1, full, err);
-    if (status != PB_OK) break;
-    for (size_t k = 0; k < n * n; k++) {
-      work[k] = full[channels->metrology[k / n] * model->nu + channels->input[k % n]];
+  for (size_t first = 0; first < nf && status == PB_OK; first += AT_ONCE) {
+    size_t count = nf - first < AT_ONCE ? nf - first : AT_ONCE;
+    status = iff ? pb_loop_frf(&loop, 1, hz + first, count, full, err)
+                 : pb_model_frf(model, PB_SAMPLED, hz + first, count, full, err);
+    for (size_t f = 0; f < count && status == PB_OK; f++) {
+      const double complex *at = full + f * all;
+      for (size_t k = 0; k < n * n; k++) {
+        work[k] = at[channels->metrology[k / n] * model->nu + channels->input[k % n]];
+      }
+      pb_hac_transform(n, frame->ty, frame->tu, work, h + (first + f) * n * n);
     }
-    pb_hac_transform(n, frame->ty, frame->tu, work, h + f * n * n);
   }
   free(full);
   free(work);

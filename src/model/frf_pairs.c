@@ -6,18 +6,23 @@
 #include "base/array.h"
 #include "base/lapack.h"
 
-enum { BLOCKS = 128, POINTS = 256 };  // of one product
+enum { BLOCKS = 128, POINTS = 256 };  // of one product, at most
 
 typedef struct batch {
   const pb_model *m;
   const double *a, *b;
   double shift;
-  size_t nf, entries;  // points; ny × nu
-  double *point[2];    // [nf] q
-  double *n;           // entries × 2 blocks: N_1 and N_0 of each block
-  double *weight[2];   // points × 2 blocks: q / det and 1 / det
-  double *sum[2];      // entries × nf
+  size_t nf, entries;     // points; ny × nu
+  size_t blocks, points;  // of one product
+  double *point[2];       // [nf] q
+  double *n;              // entries × 2 blocks: N_1 and N_0 of each block
+  double *weight[2];      // points × 2 blocks: q / det and 1 / det
+  double *sum[2];         // entries × nf
 } batch;
+
+static size_t smaller(size_t a, size_t b) {
+  return a < b ? a : b;
+}
 
 static void batch_clear(batch *t) {
   free(t->n);
@@ -30,10 +35,10 @@ static void batch_clear(batch *t) {
 
 static bool batch_new(batch *t, const double complex *q) {
   bool ok = true;
-  t->n = pb_array_new(t->entries * 2 * BLOCKS, sizeof(double));
+  t->n = pb_array_new(t->entries * 2 * t->blocks, sizeof(double));
   for (int part = 0; part < 2; part++) {
     t->point[part] = pb_array_new(t->nf, sizeof(double));
-    t->weight[part] = pb_array_new((size_t)2 * POINTS * BLOCKS, sizeof(double));
+    t->weight[part] = pb_array_new(2 * t->points * t->blocks, sizeof(double));
     t->sum[part] = pb_array_zero(t->entries * t->nf, sizeof(double));
     ok = ok && t->point[part] && t->weight[part] && t->sum[part];
   }
@@ -79,16 +84,16 @@ static void weights(const batch *t, size_t block, size_t first, size_t count,
 
 // The sum over the blocks from `first` on, all points.
 static void add_blocks(batch *t, size_t first, size_t blocks) {
-  const int entries = (int)t->entries, inner = (int)(2 * blocks), ld = POINTS;
+  const int entries = (int)t->entries, inner = (int)(2 * blocks), ld = (int)t->points;
   const double one = 1;
   for (size_t k = 0; k < blocks; k++)
     numerators(t, first + k, t->n + 2 * k * t->entries, t->n + (2 * k + 1) * t->entries);
-  for (size_t f = 0; f < t->nf; f += POINTS) {
-    const size_t count = t->nf - f < POINTS ? t->nf - f : POINTS;
+  for (size_t f = 0; f < t->nf; f += t->points) {
+    const size_t count = smaller(t->nf - f, t->points);
     const int points = (int)count;
     for (size_t k = 0; k < blocks; k++) {
-      double *const slope[2] = {t->weight[0] + 2 * k * POINTS, t->weight[1] + 2 * k * POINTS};
-      double *const level[2] = {slope[0] + POINTS, slope[1] + POINTS};
+      double *const slope[2] = {t->weight[0] + 2 * k * t->points, t->weight[1] + 2 * k * t->points};
+      double *const level[2] = {slope[0] + t->points, slope[1] + t->points};
       weights(t, first + k, f, count, slope, level);
     }
     for (int part = 0; part < 2; part++)
@@ -100,10 +105,12 @@ static void add_blocks(batch *t, size_t first, size_t blocks) {
 pb_status pb_pairs_response(const pb_model *m, const double *a, const double *b, double shift,
                             const double complex *q, size_t nf, double complex *h, pb_error *err) {
   batch t = {.m = m, .a = a, .b = b, .shift = shift, .nf = nf, .entries = m->ny * m->nu};
+  t.blocks = smaller(m->pairs, BLOCKS);
+  t.points = smaller(nf, POINTS);
   if (!t.entries || !nf || !m->pairs) return PB_OK;
   const bool ok = batch_new(&t, q);
-  for (size_t k = 0; k < m->pairs && ok; k += BLOCKS)
-    add_blocks(&t, k, m->pairs - k < BLOCKS ? m->pairs - k : BLOCKS);
+  for (size_t k = 0; k < m->pairs && ok; k += t.blocks)
+    add_blocks(&t, k, smaller(m->pairs - k, t.blocks));
   for (size_t i = 0; i < t.entries * nf && ok; i++) h[i] += t.sum[0][i] + I * t.sum[1][i];
   batch_clear(&t);
   return ok ? PB_OK : pb_fail_memory(err, "");

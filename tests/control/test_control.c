@@ -275,7 +275,8 @@ static void one_strut_is_controlled(void **state) {
   e2e_daemon_end(&daemon);
 }
 
-int main(void) {
+// An argument names the tests to run (* and ?).
+int main(int argc, char **argv) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(iff_finds_the_gain_and_the_damping),
       cmocka_unit_test(iff_gain_is_the_best),
@@ -286,5 +287,6 @@ int main(void) {
       cmocka_unit_test(hac_lac_over_the_bus_is_as_predicted),
       cmocka_unit_test(one_strut_is_controlled),
   };
+  if (argc > 1) cmocka_set_test_filter(argv[1]);
   return cmocka_run_group_tests(tests, begin, finish);
 }

@@ -149,17 +149,38 @@ char *e2e_result(pb_session *session, const char *kind, const char *body) {
   return result;
 }
 
-double e2e_number(pb_session *session, const char *kind, const char *body, const char *key) {
-  char *result = e2e_result(session, kind, body);
+// A number of a result, which is freed.
+static double number_of(char *result, const char *key) {
   cJSON *json = NULL;
-  pb_error err = {PB_OK, "", ""};
-  assert_int_equal(pb_json_parse(result, strlen(result), &json, &err), PB_OK);
-  const cJSON *item = pb_json_member(json, key);
-  if (!cJSON_IsNumber(item)) fail_msg("%s: no number '%s' in %s", kind, key, result);
+  assert_int_equal(pb_json_parse(result, strlen(result), &json, NULL), PB_OK);
+  const cJSON *list = pb_json_member(json, "revisions");  // of a history: the newest
+  const cJSON *item =
+      pb_json_member(list ? cJSON_GetArrayItem(list, cJSON_GetArraySize(list) - 1) : json, key);
+  if (!cJSON_IsNumber(item)) fail_msg("no number '%s' in %s", key, result);
   const double value = item->valuedouble;
   cJSON_Delete(json);
   free(result);
   return value;
+}
+
+double e2e_number(pb_session *session, const char *kind, const char *body, const char *key) {
+  return number_of(e2e_result(session, kind, body), key);
+}
+
+// The daemon answers at the latest within a second: what takes longer is told by an event.
+double e2e_change(pb_session *session, const char *kind, const char *body, const char *key) {
+  pb_error err = {PB_OK, "", ""};
+  pb_session_event event = {0};
+  pb_answer answer = {0};
+  if (pb_session_ask(session, kind, body, E2E_CAP, &answer, &err))
+    fail_msg("%s: %s: %s", kind, err.where, err.message);
+  if (answer.accepted && (pb_session_wait_event(session, "reconfigured configure_failed",
+                                                answer.event, E2E_CAP, NULL, &event, &err) ||
+                          strcmp(event.kind, "reconfigured") != 0))
+    fail_msg("%s: %s%s", kind, err.message, event.message);
+  if (!answer.accepted) return number_of(answer.result, key);
+  pb_answer_clear(&answer);
+  return e2e_number(session, "history", NULL, key);
 }
 
 void e2e_refused(pb_session *session, const char *kind, const char *body, const char *pointer,

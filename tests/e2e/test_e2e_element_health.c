@@ -23,7 +23,7 @@ static void run(const char *format, ...) {
 }
 
 static double configure(pb_session *session, const char *patch) {
-  return e2e_number(session, "configure", patch, "revision");
+  return e2e_change(session, "configure", patch, "revision");
 }
 
 // The line that follows the one of revision `number`.

@@ -35,10 +35,26 @@ static bool look(void *context, const pb_sample *sample, double *command) {
   return sample->step - w->first < w->want;
 }
 
-static void run(pb_session *session, watch *w, double stall) {
-  const pb_run_options options = {.on_sample = look, .context = w, .stall = stall};
+static void run(pb_session *session, watch *w) {
+  const pb_run_options options = {.on_sample = look, .context = w, .stall = E2E_CAP};
   pb_error err = {PB_OK, "", ""};
   if (pb_session_run(session, &options, NULL, &err)) fail_msg("%s", err.message);
+}
+
+// Steps a second within 10 % of `wanted` in one of several runs: what else the machine does may
+// hold up the daemon or this program for a while, a wrong rate is wrong in all.
+static watch run_at(pb_session *session, double wanted, uint64_t steps) {
+  enum { RUNS = 10 };
+  double rate = 0.0;
+  for (int i = 0; i < RUNS; i++) {
+    watch w = {.want = steps};
+    run(session, &w);
+    rate = (double)(w.last - w.first) / (w.end - w.begin);
+    assert_true(w.ordered);
+    if (rate > 0.9 * wanted && rate < 1.1 * wanted) return w;
+  }
+  fail_msg("%g steps a second instead of %g", rate, wanted);
+  return (watch){0};
 }
 
 static void the_plant_runs_at_its_rate(void **state) {
@@ -48,12 +64,7 @@ static void the_plant_runs_at_its_rate(void **state) {
   pb_session *session = e2e_open(&daemon);
   assert_int_equal(pb_session_description(session)->mode, PB_REALTIME);
   e2e_attach(session, "test", "Va", 0.0);
-  watch w = {.want = 10000};  // one second
-  run(session, &w, 2.0);
-  const double rate = (double)(w.last - w.first) / (w.end - w.begin);
-  assert_true(w.ordered);
-  assert_true(w.acted);
-  if (rate < 9000.0 || rate > 11000.0) fail_msg("%g steps a second instead of 10000", rate);
+  assert_true(run_at(session, 10000.0, 10000).acted);
   pb_session_close(session);
   e2e_daemon_end(&daemon);
 }
@@ -63,11 +74,7 @@ static void the_speed_is_a_factor(void **state) {
   e2e_daemon daemon = e2e_daemon_start(E2E_BENCH, NULL);
   pb_session *session = e2e_open(&daemon);
   e2e_request(session, "set_mode", "{\"mode\":\"realtime\",\"speed\":0.1}");
-  watch w = {.want = 500};  // half a second at a tenth of 10 kHz
-  run(session, &w, 2.0);
-  const double rate = (double)(w.last - w.first) / (w.end - w.begin);
-  if (rate < 900.0 || rate > 1100.0) fail_msg("%g steps a second instead of 1000", rate);
-  assert_false(w.acted);  // an observer: not attached
+  assert_false(run_at(session, 1000.0, 500).acted);  // an observer: not attached
   pb_session_close(session);
   e2e_daemon_end(&daemon);
 }
@@ -118,7 +125,7 @@ static void lockstep_begins_where_the_plant_is(void **state) {
     pb_session_detach(session);  // its lease may be over
     e2e_attach(session, "test", "Va", 0.0);
     watch w = {.want = 3};
-    run(session, &w, 2.0);
+    run(session, &w);
     assert_int_equal(w.last, w.first + 3);
   }
   pb_session_close(session);
@@ -127,7 +134,7 @@ static void lockstep_begins_where_the_plant_is(void **state) {
 
 static plantbus_Sample sample_newest(dds_entity_t reader) {
   plantbus_Sample sample = {0};
-  for (int i = 0; i < 50000; i++) {
+  for (int i = 0; i < 10000 * (int)E2E_CAP; i++) {
     void *out[1] = {&sample};
     dds_sample_info_t info;
     if (dds_take(reader, out, &info, 1, 1) == 1 && info.valid_data) return sample;
@@ -177,15 +184,15 @@ static void modes_may_change(void **state) {
   pb_session *session = e2e_open(&daemon);
   e2e_attach(session, "test", "Va", 0.0);
   watch lockstep = {.want = 100};
-  run(session, &lockstep, 2.0);
+  run(session, &lockstep);
   assert_int_equal(lockstep.last, 100);
   e2e_request(session, "set_mode", "{\"mode\":\"realtime\"}");
   watch realtime = {.want = 1000};
-  run(session, &realtime, 2.0);
+  run(session, &realtime);
   assert_true(realtime.first >= 100);
   e2e_request(session, "set_mode", "{\"mode\":\"lockstep\"}");
   watch again = {.want = 100};
-  run(session, &again, 2.0);
+  run(session, &again);
   assert_true(again.first >= realtime.last);
   assert_int_equal(again.last, again.first + 100);
   assert_int_equal(pb_session_description(session)->mode, PB_LOCKSTEP);
@@ -234,7 +241,7 @@ static void the_status_has_times_and_ages(void **state) {
   const dds_entity_t status = e2e_raw_reader(&raw, PB_TOPIC_STATUS);
   e2e_attach(session, "test", "Va", 0.0);
   watch w = {.want = 3000};
-  run(session, &w, 2.0);
+  run(session, &w);
   plantbus_PlantStatus *s = e2e_status_wait(status, has_run);
   uint64_t steps = 0, waits = 0;
   for (int i = 0; i < 64; i++) steps += s->step_time.bin[i], waits += s->jitter.bin[i];

@@ -41,7 +41,8 @@ static void the_step_thread_keeps_to_itself(void **state) {
   e2e_request(other, "host_controller",
               "{\"channel\":\"iff\",\"type\":\"iff\",\"inputs\":[\"Va\"],\"outputs\":[\"Vs\"],"
               "\"gain\":10}");
-  e2e_request(other, "configure", "{\"patch\":{\"components\":{\"mass\":{\"mass\":7}}}}");
+  assert_true(e2e_change(other, "configure", "{\"patch\":{\"components\":{\"mass\":{\"mass\":7}}}}",
+                         "revision") == 2.0);
   const pb_run_options options = {
       .on_sample = look, .context = &w, .stall = E2E_CAP, .any_revision = true};
   if (pb_session_run(session, &options, NULL, &err)) fail_msg("%s", err.message);

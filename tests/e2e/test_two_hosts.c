@@ -10,8 +10,7 @@
 
 #include "hosts.h"
 
-#define RECOVERY 10.0  // s, cap
-#define LONG "60"      // s: a guard or a stall that no test comes to
+#define LONG "60"  // s: a guard or a stall that no test comes to
 
 static const double short_outage = 1.0;  // s
 enum { STEPS = 2000 };
@@ -96,7 +95,7 @@ static void outage_last(double seconds) {
 static void expect_done(e2e_child *remote, unsigned long long steps) {
   unsigned long long last = 0, compared = 0;
   char line[256];
-  e2e_expect_line_within(remote, "done ", line, RECOVERY);
+  e2e_expect_line_within(remote, "done ", line, E2E_CAP);
   assert_int_equal(sscanf(line, "done %llu compared %llu", &last, &compared), 2);
   assert_int_equal(compared, last + 1);
   if (steps) assert_int_equal(last, steps);
@@ -106,16 +105,16 @@ static void expect_done(e2e_child *remote, unsigned long long steps) {
 // The same client attaches again; and a new one finds the daemon.
 static void expect_recovery(setting *s, e2e_child *remote) {
   char line[256];
-  e2e_expect_line_within(remote, "again ", line, RECOVERY);
+  e2e_expect_line_within(remote, "again ", line, E2E_CAP);
   assert_int_equal(e2e_reap(remote), 0);
-  e2e_child fresh = remote_start(&s->daemon, LONG, "200", "10", LONG);
-  e2e_expect_line_within(&fresh, "done ", line, RECOVERY);
+  e2e_child fresh = remote_start(&s->daemon, LONG, "200", LONG, LONG);
+  e2e_expect_line_within(&fresh, "done ", line, E2E_CAP);
   assert_int_equal(e2e_reap(&fresh), 0);
 }
 
 static void expect_said(e2e_child *remote, const char *start, const char *part) {
   char line[256];
-  e2e_expect_line_within(remote, start, line, RECOVERY);
+  e2e_expect_line_within(remote, start, line, E2E_CAP);
   if (!strstr(line, part)) fail_msg("expected '%s', was told '%s'", part, line);
 }
 
@@ -132,7 +131,7 @@ static hosts_discovery discovery_of(void **state) {
 
 static void a_remote_client_runs(void **state) {
   e2e_daemon daemon = daemon_start(discovery_of(state));
-  e2e_child remote = remote_start(&daemon, LONG, "2000", "5", LONG);
+  e2e_child remote = remote_start(&daemon, LONG, "2000", LONG, LONG);
   expect_done(&remote, STEPS);
   e2e_daemon_end(&daemon);
 }
@@ -140,7 +139,7 @@ static void a_remote_client_runs(void **state) {
 // Nothing is lost, nothing acts twice: the whole run equals the library's plant.
 static void a_patient_run_goes_on_after_a_short_outage(void **state) {
   setting s = setting_open(discovery_of(state), false);
-  e2e_child remote = remote_start(&s.daemon, LONG, "0", "5", LONG);
+  e2e_child remote = remote_start(&s.daemon, LONG, "0", LONG, LONG);
   expect_said(&remote, "running", "");
   expect_steps(&s, "steps before the outage");
   hosts_link(false);
@@ -157,7 +156,7 @@ static void a_patient_run_goes_on_after_a_short_outage(void **state) {
 
 static void an_outage_longer_than_the_guard_evicts(void **state) {
   setting s = setting_open(discovery_of(state), true);
-  e2e_child remote = remote_start(&s.daemon, "0.3", "0", "5", LONG);
+  e2e_child remote = remote_start(&s.daemon, "0.3", "0", LONG, LONG);
   expect_said(&remote, "running", "");
   hosts_link(false);
   expect_event(&s, &remote);
@@ -171,7 +170,7 @@ static void an_outage_longer_than_the_guard_evicts(void **state) {
 
 static void a_client_tells_that_the_plant_stands_still(void **state) {
   setting s = setting_open(discovery_of(state), false);
-  e2e_child remote = remote_start(&s.daemon, LONG, "0", "5", "0.5");
+  e2e_child remote = remote_start(&s.daemon, LONG, "0", LONG, "1.5");
   expect_said(&remote, "running", "");
   hosts_link(false);
   expect_said(&remote, "failed: ", "the plant stands still");
@@ -184,7 +183,7 @@ static void a_client_tells_that_the_plant_stands_still(void **state) {
 // Longer than the lease of discovery: both hosts have given each other up.
 static void a_long_outage_is_told_on_both_sides(void **state) {
   setting s = setting_open(discovery_of(state), true);
-  e2e_child remote = remote_start(&s.daemon, LONG, "0", "5", LONG);
+  e2e_child remote = remote_start(&s.daemon, LONG, "0", LONG, LONG);
   expect_said(&remote, "running", "");
   hosts_link(false);
   expect_event(&s, &remote);
@@ -205,7 +204,7 @@ static void a_long_outage_is_told_on_both_sides(void **state) {
 static void lost_packets_do_not_harm_a_run(void **state) {
   (void)state;
   e2e_daemon daemon = daemon_start(HOSTS_LOSSY);
-  e2e_child remote = remote_start(&daemon, LONG, "2000", "5", LONG);
+  e2e_child remote = remote_start(&daemon, LONG, "2000", LONG, LONG);
   expect_done(&remote, STEPS);
   e2e_daemon_end(&daemon);
   daemon = daemon_start(HOSTS_MUTE);
@@ -222,7 +221,7 @@ static void delay_and_loss_of_the_network_do_not_harm_a_run(void **state) {
     skip();
   }
   e2e_daemon daemon = daemon_start(HOSTS_MULTICAST);
-  e2e_child remote = remote_start(&daemon, LONG, "1000", "5", LONG);
+  e2e_child remote = remote_start(&daemon, LONG, "1000", LONG, LONG);
   expect_done(&remote, 1000);
   hosts_calm();
   e2e_daemon_end(&daemon);

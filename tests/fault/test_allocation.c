@@ -2,6 +2,7 @@
 // reports it, hands nothing out and leaks nothing (the sanitizers' build sees to the latter).
 #include "support/beam.h"
 #include "support/check.h"
+#include "support/faults.h"
 
 #include "assembly/system.h"
 #include "base/json.h"
@@ -13,30 +14,6 @@
 #include "model/model.h"
 #include "model/transfer.h"
 #include "signal/psd.h"
-
-void *__real_malloc(size_t size);
-void *__real_calloc(size_t count, size_t size);
-void *__real_realloc(void *p, size_t size);
-void *__real_aligned_alloc(size_t alignment, size_t size);
-
-static long allocations, failing;  // failing: the number of the allocation that fails; 0: none
-
-static bool fails(void) {
-  return ++allocations == failing;
-}
-
-void *__wrap_malloc(size_t size) {
-  return fails() ? NULL : __real_malloc(size);
-}
-void *__wrap_calloc(size_t count, size_t size) {
-  return fails() ? NULL : __real_calloc(count, size);
-}
-void *__wrap_realloc(void *p, size_t size) {
-  return fails() ? NULL : __real_realloc(p, size);
-}
-void *__wrap_aligned_alloc(size_t alignment, size_t size) {
-  return fails() ? NULL : __real_aligned_alloc(alignment, size);
-}
 
 typedef pb_status (*subject)(const char *input, pb_error *err);
 

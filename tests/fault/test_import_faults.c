@@ -2,35 +2,12 @@
 // each time the call reports it, hands nothing out and leaks nothing.
 #include "support/beam.h"
 #include "support/check.h"
+#include "support/faults.h"
 #include "support/outside.h"
-
-#include <malloc.h>
 
 #include "part/import.h"
 #include "part/truncate.h"
 #include "plant/element_doctor.h"
-
-void *__real_malloc(size_t size);
-void *__real_calloc(size_t count, size_t size);
-void *__real_realloc(void *p, size_t size);
-
-static long allocations, failing;  // failing: the number of the allocation that fails; 0: none
-
-static bool fails(void) {
-  return ++allocations == failing;
-}
-
-void *__wrap_malloc(size_t size) {
-  return fails() ? NULL : __real_malloc(size);
-}
-void *__wrap_calloc(size_t count, size_t size) {
-  return fails() ? NULL : __real_calloc(count, size);
-}
-// Giving memory back cannot hurt whoever asks: only growth fails.
-void *__wrap_realloc(void *p, size_t size) {
-  if (p && size <= malloc_usable_size(p)) return __real_realloc(p, size);
-  return fails() ? NULL : __real_realloc(p, size);
-}
 
 static char folder[] = "/tmp/pb-faults-XXXXXX";
 static outside_element element;
@@ -176,6 +153,7 @@ static int end(void **state) {
 }
 
 int main(void) {
+  only_growth_fails = true;  // giving memory back cannot hurt whoever asks
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_readers),
       cmocka_unit_test(test_import),

@@ -7,15 +7,9 @@ pb_test(part_truncate LABELS unit SOURCES test_truncate.c ../support/beam.c
 pb_test(part_import LABELS unit SOURCES test_import.c ../support/outside.c ../support/beam.c
         LIBS plantbus_part PkgConfig::MATIO)
 
-# Allocations are routed through the test by the linker.
-pb_test(fault_import LABELS fault SOURCES ../fault/test_import_faults.c ../support/outside.c
+pb_test(fault_import LABELS fault FAULTS SOURCES ../fault/test_import_faults.c ../support/outside.c
         ../support/beam.c LIBS plantbus_part PkgConfig::MATIO TIMEOUT 300)
-target_link_options(fault_import PRIVATE -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc)
 
 pb_test(part_import_tool LABELS e2e SOURCES test_import_tool.c part_run.c ../support/outside.c
         ../support/beam.c LIBS plantbus_part cjson PkgConfig::MATIO)
 add_dependencies(part_import_tool plantbus-part plantbus-model)
-
-# Small problems: more than one thread of the BLAS only waits.
-set_tests_properties(part_truncate part_element_doctor part_import_tool fault_import PROPERTIES
-                     ENVIRONMENT "OPENBLAS_NUM_THREADS=1")

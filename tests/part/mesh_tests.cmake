@@ -1,12 +1,7 @@
 # Meshes, their matrices, and elements built from dimensions.
 pb_test(test_mesh LABELS unit SOURCES test_mesh.c LIBS plantbus_part)
-pb_test(test_parts LABELS reference SOURCES test_parts.c LIBS plantbus_part TIMEOUT 300)
+pb_test(test_parts LABELS reference long SOURCES test_parts.c LIBS plantbus_part TIMEOUT 300)
 pb_test(test_build_tool LABELS e2e SOURCES test_build_tool.c part_run.c LIBS plantbus_part
-        cjson TIMEOUT 300)
+        cjson TIMEOUT 300 COST 40)
 add_dependencies(test_build_tool plantbus-part)
-pb_test(test_mesh_fault LABELS fault SOURCES test_mesh_fault.c LIBS plantbus_part TIMEOUT 300)
-target_link_options(test_mesh_fault PRIVATE -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc)
-
-# Several tests share the processors: threads that wait for each other cost more than they bring.
-set_tests_properties(test_parts test_build_tool test_mesh_fault PROPERTIES
-  ENVIRONMENT "OPENBLAS_NUM_THREADS=1")
+pb_test(test_mesh_fault LABELS fault FAULTS SOURCES test_mesh_fault.c LIBS plantbus_part TIMEOUT 300)

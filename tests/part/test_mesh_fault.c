@@ -3,26 +3,7 @@
 #include "base/json.h"
 #include "part/characteristics.h"
 #include "support/check.h"
-
-void *__real_malloc(size_t size);
-void *__real_calloc(size_t count, size_t size);
-void *__real_realloc(void *p, size_t size);
-
-static long allocations, failing;  // failing: the number of the allocation that fails; 0: none
-
-static bool fails(void) {
-  return ++allocations == failing;
-}
-
-void *__wrap_malloc(size_t size) {
-  return fails() ? NULL : __real_malloc(size);
-}
-void *__wrap_calloc(size_t count, size_t size) {
-  return fails() ? NULL : __real_calloc(count, size);
-}
-void *__wrap_realloc(void *p, size_t size) {
-  return fails() ? NULL : __real_realloc(p, size);
-}
+#include "support/faults.h"
 
 typedef pb_status (*subject)(const cJSON *json, pb_error *err);
 

@@ -3,27 +3,8 @@
 #include <SuiteSparse_config.h>
 
 #include "support/check.h"
+#include "support/faults.h"
 #include "truss.h"
-
-void *__real_malloc(size_t size);
-void *__real_calloc(size_t count, size_t size);
-void *__real_realloc(void *p, size_t size);
-
-static long allocations, failing;  // failing: the number of the allocation that fails; 0: none
-
-static bool fails(void) {
-  return ++allocations == failing;
-}
-
-void *__wrap_malloc(size_t size) {
-  return fails() ? NULL : __real_malloc(size);
-}
-void *__wrap_calloc(size_t count, size_t size) {
-  return fails() ? NULL : __real_calloc(count, size);
-}
-void *__wrap_realloc(void *p, size_t size) {
-  return fails() ? NULL : __real_realloc(p, size);
-}
 
 // CHOLMOD allocates through these pointers.
 static void route_cholmod(void) {
