@@ -63,14 +63,6 @@ const pb_loop *pb_loop_solver_loop(const pb_loop_solver *solver);
 pb_status pb_loop_solver_poles(pb_loop_solver *solver, double gain, double f1, double f2,
                                pb_pole_list *out, pb_error *err);
 
-// The same without the iteration: of a large plant the poles with its low modes only.
-pb_status pb_loop_solver_estimate(pb_loop_solver *solver, double gain, double f1, double f2,
-                                  pb_pole_list *out, pb_error *err);
-
-// Makes estimates exact, in place; one that leads nowhere becomes NaN.
-pb_status pb_loop_solver_polish(pb_loop_solver *solver, double gain, pb_pole *pole, size_t count,
-                                pb_error *err);
-
 // Whether all closed-loop poles are inside the unit circle. Up to PB_LOOP_STABLE_DENSE states by
 // the dense eigenvalues. Above by the argument principle: det(I − L(z)) turns −2π·(poles outside)
 // along the circle when the open loop has none outside; the phase is followed in steps of less than
