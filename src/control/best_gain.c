@@ -108,6 +108,20 @@ static void forget_unreachable(pb_rootlocus *l) {
   for (size_t k = 0; k < l->gains; k++) pb_rootlocus_find_smallest(l, k);
 }
 
+// What the modes have at gain k where that is more than was attained so far.
+static void note_attained(const pb_rootlocus *l, size_t k, pb_best_gain *out) {
+  size_t mode = 0;
+  for (size_t b = 0; b < l->branches; b++) {
+    if (!l->is_mode[b]) continue;
+    double damping = l->pole[b * l->gains + k].damping;
+    if (damping > out->attainable[mode]) {
+      out->attainable[mode] = damping;
+      out->attained_at[mode] = l->gain[k];
+    }
+    mode++;
+  }
+}
+
 // Repeats the search between the neighbours of the best gain, starting from the lower one's poles.
 // Not beyond `limit`.
 static pb_status refine(pb_loop_solver *s, const pb_rootlocus *from, double limit, size_t best,
@@ -115,6 +129,7 @@ static pb_status refine(pb_loop_solver *s, const pb_rootlocus *from, double limi
   size_t low = best - 1, high = best + 1 < from->gains ? best + 1 : best;
   out->gain = from->gain[best];
   out->smallest_damping = from->smallest[best];
+  note_attained(from, best, out);
   if (rounds == 0) return PB_OK;
   pb_rootlocus l;
   const bool allowed[REFINE_GAINS] = {false};
@@ -144,16 +159,11 @@ static pb_status attainable(const pb_rootlocus *l, const bool *unstable, pb_best
   size_t mode = 0;
   for (size_t b = 0; b < l->branches; b++) {
     if (!l->is_mode[b]) continue;
-    const pb_pole *p = l->pole + b * l->gains;
-    out->attainable[mode] = p[0].damping;
-    out->attained_at[mode] = 0;
-    for (size_t k = 1; k < l->gains; k++) {
-      if (unstable[k] || !(p[k].damping > out->attainable[mode])) continue;
-      out->attainable[mode] = p[k].damping;
-      out->attained_at[mode] = l->gain[k];
-    }
-    mode++;
+    out->attainable[mode] = l->pole[b * l->gains].damping;
+    out->attained_at[mode++] = 0;
   }
+  for (size_t k = 1; k < l->gains; k++)
+    if (!unstable[k]) note_attained(l, k, out);
   return PB_OK;
 }
 
