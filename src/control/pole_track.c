@@ -7,7 +7,9 @@
 
 #include "control/loop_internal.h"
 
-enum { HALVINGS = 6 };
+// How often a step may be halved. Where all poles are paired each time costs as many eigenvalue
+// problems again, and one has been enough.
+enum { HALVINGS = 6, HALVINGS_PAIRED = 1 };
 // Poles this near to one another, relative to their distance from z = 1, may change places unseen.
 static const double alike = 1e-3;
 static const double smallest_z = 0.3;  // below, poles vanish within a few samples
@@ -189,7 +191,7 @@ static pb_status advance(pb_pole_track *t, double gain, unsigned halvings, pb_er
 }
 
 pb_status pb_pole_track_advance(pb_pole_track *t, double gain, pb_error *err) {
-  return advance(t, gain, HALVINGS, err);
+  return advance(t, gain, t->solver->exact ? HALVINGS_PAIRED : HALVINGS, err);
 }
 
 pb_pole pb_pole_track_get(const pb_pole_track *t, size_t k) {
