@@ -24,7 +24,7 @@ typedef struct pb_fit_options {
   double sample_rate;  // Hz
   double f1, f2;       // Hz, lines used; both 0: all
   size_t poles;        // order; 0: found
-  size_t max_poles;    // limit of the search; 0: 40
+  size_t max_poles;    // limit of the search, which begins with 4; 0: 40
   double tolerance;    // relative rms error at which the search ends; 0: 1e-7
   double floor;        // of PB_FIT_NOISE: relative error that the data has at best; 0: 1e-4
   pb_fit_weight weight;

@@ -13,6 +13,15 @@ typedef struct pb_fit_data {
   double *weight;     // [channels][lines]
 } pb_fit_data;
 
+// The lines of the band that all channels have. Zeroed on failure. PB_ERR_ARGUMENT, PB_ERR_NUMERIC,
+// PB_ERR_MEMORY. [init]
+pb_status pb_fit_data_new(const pb_frf *frf, const pb_fit_channel *channel, size_t channels,
+                          const pb_fit_options *options, pb_fit_data *out, pb_error *err);
+void pb_fit_data_clear(pb_fit_data *data);
+
+// Median of |h[n]|; work[n]. [any]
+double pb_fit_median_size(const double complex *h, size_t n, double *work);
+
 // A model under way: n real parameters of poles, pairs at (k, k+1) with conjugate p[k+1].
 typedef struct pb_fit_poles {
   size_t n;

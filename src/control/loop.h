@@ -63,19 +63,12 @@ const pb_loop *pb_loop_solver_loop(const pb_loop_solver *solver);
 pb_status pb_loop_solver_poles(pb_loop_solver *solver, double gain, double f1, double f2,
                                pb_pole_list *out, pb_error *err);
 
-// The same without the iteration: of a large plant the poles with its low modes only.
-pb_status pb_loop_solver_estimate(pb_loop_solver *solver, double gain, double f1, double f2,
-                                  pb_pole_list *out, pb_error *err);
-
-// Makes estimates exact, in place; one that leads nowhere becomes NaN.
-pb_status pb_loop_solver_polish(pb_loop_solver *solver, double gain, pb_pole *pole, size_t count,
-                                pb_error *err);
-
 // Whether all closed-loop poles are inside the unit circle. Up to PB_LOOP_STABLE_DENSE states by
 // the dense eigenvalues. Above by the argument principle: det(I − L(z)) turns −2π·(poles outside)
 // along the circle when the open loop has none outside; the phase is followed in steps of less than
-// a radian, finest where poles are near. *worst (may be NULL) is the pole of largest |z| that is
-// known. Delays of the electronics count as states. The open loop must be stable but for a
+// a radian, finest where poles are near, and where the determinant's size changes much. *worst (may
+// be NULL) is the pole of largest |z| that is known: beyond the lowest modes of a large plant not
+// all are. Delays of the electronics count as states. The open loop must be stable but for a
 // controller's integrators (a floating plant is PB_ERR_STATE above that size).
 enum { PB_LOOP_STABLE_DENSE = 400 };
 pb_status pb_loop_solver_stable(pb_loop_solver *solver, double gain, bool *stable, pb_pole *worst,

@@ -25,4 +25,20 @@ struct pb_loop_solver {
   double complex *m, *rhs;  // [n_in × n_in]
 };
 
+// All closed-loop poles of both half planes, without the iteration: of a large plant those with its
+// low modes only. Their number does not depend on the gain. *z [*count], with room for far_count
+// more, is the caller's (free).
+pb_status pb_loop_all_poles(pb_loop_solver *solver, double gain, double complex **z, size_t *count,
+                            pb_error *err);
+
+// Moves z[count] onto the roots of the whole plant's loop next to them, each kept apart from the
+// others; lost[count]: where that leads nowhere.
+pb_status pb_loop_refine_roots(pb_loop_solver *solver, double gain, double complex *z, size_t count,
+                               bool *lost, pb_error *err);
+
+// Makes the roots z[*count] exact together, each kept apart from the others; takes out what did not
+// converge. *lost: of these as many as cannot be the reduction's own.
+pb_status pb_loop_make_exact(pb_loop_solver *solver, double gain, double complex *z, size_t *count,
+                             size_t *lost, pb_error *err);
+
 #endif

@@ -80,9 +80,10 @@ static double complex without_integrators(const pb_loop_solver *s, double comple
   return factor;
 }
 
-// Phase of det(I − L(e^{iθ})), freed of integrators, in −π … π.
-static pb_status phase_at(pb_loop_solver *s, double gain, double theta, double *phase,
-                          pb_error *err) {
+// Logarithm of det(I − L(e^{iθ})), freed of integrators: of its size, and i times its phase in −π …
+// π.
+static pb_status log_at(pb_loop_solver *s, double gain, double theta, double complex *value,
+                        pb_error *err) {
   size_t n = s->loop.controller->ny, nk = s->loop.controller->nu;
   double complex z = CMPLX(cos(theta), sin(theta));
   double complex factor =
@@ -97,9 +98,10 @@ static pb_status phase_at(pb_loop_solver *s, double gain, double theta, double *
       s->m[r + c * n] = (r == c) - factor * l;
     }
   }
-  *phase = carg(determinant(s->m, n) * without_integrators(s, z));
-  return isfinite(*phase) ? PB_OK
-                          : pb_fail(err, PB_ERR_NUMERIC, "loop", "no value at θ = %g", theta);
+  *value = clog(determinant(s->m, n) * without_integrators(s, z));
+  return isfinite(cimag(*value)) && !isnan(creal(*value))
+             ? PB_OK
+             : pb_fail(err, PB_ERR_NUMERIC, "loop", "no value at θ = %g", theta);
 }
 
 static int ascending(const void *a, const void *b) {
@@ -107,24 +109,29 @@ static int ascending(const void *a, const void *b) {
   return (p > q) - (p < q);
 }
 
-// Angles of 0 … π: even steps, and around each open-loop pole its distance to the circle times
-// powers of 3. *count of them, the caller frees.
-static double *make_grid(const pb_loop_solver *s, size_t *count) {
-  enum { EVEN = 2000, AROUND = 9 };
+enum { EVEN = 2000, AROUND = 9 };
+
+// Angles of 0 … π around a pole: its distance to the circle times powers of 3.
+static void add_around(double complex z, double *grid, size_t *count) {
+  double theta = carg(z), width = fabs(1 - cabs(z));
+  if (theta < 0 || width > 0.1) return;
+  for (int k = -AROUND / 2; k <= AROUND / 2; k++) {
+    double at = theta + (k < 0 ? -width : width) * (k == 0 ? 0 : pow(3, abs(k) - 2));
+    if (at > 0 && at < M_PI) grid[(*count)++] = at;
+  }
+}
+
+// Even steps, and those around each pole of the open and of the closed loop: of two closed-loop
+// poles at one place the turns by −π each would go unseen between even steps. *count of them, the
+// caller frees.
+static double *make_grid(const pb_loop_solver *s, const pb_pole_list *closed, size_t *count) {
   // A delay turns the determinant by itself: as many steps more keep each well below a radian.
-  size_t even = EVEN + 10 * s->delays;
-  double *grid = malloc((even + 1 + s->open_count * AROUND) * sizeof *grid);
-  size_t n = 0;
+  size_t even = EVEN + 10 * s->delays, n = 0;
+  double *grid = malloc((even + 1 + (s->open_count + closed->count) * AROUND) * sizeof *grid);
   for (size_t k = 0; grid && k <= even; k++) grid[n++] = M_PI * (double)k / (double)even;
   if (grid) grid[0] = 1e-9;  // nothing turns below; at 0 itself an integrator has no value
-  for (size_t j = 0; grid && j < s->open_count; j++) {
-    double theta = carg(s->open[j]), width = fabs(1 - cabs(s->open[j]));
-    if (theta < 0 || width > 0.1) continue;
-    for (int k = -AROUND / 2; k <= AROUND / 2; k++) {
-      double at = theta + (k < 0 ? -width : width) * (k == 0 ? 0 : pow(3, abs(k) - 2));
-      if (at > 0 && at < M_PI) grid[n++] = at;
-    }
-  }
+  for (size_t j = 0; grid && j < s->open_count; j++) add_around(s->open[j], grid, &n);
+  for (size_t j = 0; grid && j < closed->count; j++) add_around(closed->item[j].z, grid, &n);
   if (grid) qsort(grid, n, sizeof *grid, ascending);
   *count = n;
   return grid;
@@ -134,35 +141,54 @@ static double wrapped(double phase) {
   return remainder(phase, 2 * M_PI);
 }
 
-// Phase gained from a to b, halving the step until it turns by less than a radian.
-static pb_status turn(pb_loop_solver *s, double gain, double a, double b, double phase_a,
-                      double phase_b, unsigned depth, double *sum, pb_error *err) {
-  double step = wrapped(phase_b - phase_a);
-  if (fabs(step) < 1 || depth == 0 || !(b - a > 1e-13)) {
+// A stretch of the circle, and the logarithms at its ends.
+typedef struct stretch {
+  double a, b;
+  double complex log_a, log_b;
+} stretch;
+
+// Where the size changes by a factor of e, poles are near.
+static bool is_steep(const stretch *t) {
+  return !(fabs(creal(t->log_b) - creal(t->log_a)) < 1);
+}
+
+// Phase gained along a stretch, halved until it turns by less than a radian and is not steep: two
+// poles at one place turn it by a whole turn, which the ends alone do not show. look: halve it once
+// at least, as the next one is steep.
+static pb_status turn(pb_loop_solver *s, double gain, const stretch *t, bool look, unsigned depth,
+                      double *sum, pb_error *err) {
+  double step = wrapped(cimag(t->log_b) - cimag(t->log_a));
+  bool smooth = fabs(step) < 1 && !is_steep(t) && !look;
+  if (smooth || depth == 0 || !(t->b - t->a > 1e-13)) {
     *sum += step;
     return PB_OK;
   }
-  double middle = 0.5 * (a + b), phase;
-  pb_status status = phase_at(s, gain, middle, &phase, err);
-  if (status == PB_OK) status = turn(s, gain, a, middle, phase_a, phase, depth - 1, sum, err);
-  if (status == PB_OK) status = turn(s, gain, middle, b, phase, phase_b, depth - 1, sum, err);
+  double middle = 0.5 * (t->a + t->b);
+  double complex value;
+  pb_status status = log_at(s, gain, middle, &value, err);
+  const stretch low = {t->a, middle, t->log_a, value}, high = {middle, t->b, value, t->log_b};
+  if (status == PB_OK) status = turn(s, gain, &low, is_steep(&high), depth - 1, sum, err);
+  if (status == PB_OK) status = turn(s, gain, &high, is_steep(&low), depth - 1, sum, err);
   return status;
 }
 
-static pb_status poles_outside(pb_loop_solver *s, double gain, long *outside, pb_error *err) {
+static pb_status poles_outside(pb_loop_solver *s, double gain, const pb_pole_list *closed,
+                               long *outside, pb_error *err) {
   for (size_t j = 0; j < s->open_count; j++) {
     if (cabs(s->open[j]) < 1 || is_integrator(s, j)) continue;
     return pb_fail(err, PB_ERR_STATE, "loop",
                    "the open loop has a pole on or outside the unit circle");
   }
   size_t count;
-  double *grid = make_grid(s, &count), sum = 0, before = 0;
-  pb_status status = grid ? phase_at(s, gain, grid[0], &before, err) : pb_fail_memory(err, "loop");
+  double *grid = make_grid(s, closed, &count), sum = 0;
+  stretch t = {0};
+  bool steep = false;
+  pb_status status = grid ? log_at(s, gain, grid[0], &t.log_b, err) : pb_fail_memory(err, "loop");
   for (size_t k = 1; k < count && status == PB_OK; k++) {
-    double phase;
-    status = phase_at(s, gain, grid[k], &phase, err);
-    if (status == PB_OK) status = turn(s, gain, grid[k - 1], grid[k], before, phase, 40, &sum, err);
-    before = phase;
+    t = (stretch){grid[k - 1], grid[k], t.log_b, 0};
+    status = log_at(s, gain, grid[k], &t.log_b, err);
+    if (status == PB_OK) status = turn(s, gain, &t, steep, 40, &sum, err);
+    steep = is_steep(&t);
   }
   free(grid);
   // The lower half of the circle turns as much again.
@@ -183,8 +209,8 @@ pb_status pb_loop_solver_stable(pb_loop_solver *s, double gain, bool *stable, pb
   }
   long outside = 0;
   pb_pole_list list = {0};
-  status = poles_outside(s, gain, &outside, err);
-  if (status == PB_OK) status = pb_loop_solver_poles(s, gain, 0, INFINITY, &list, err);
+  status = pb_loop_solver_poles(s, gain, 0, INFINITY, &list, err);
+  if (status == PB_OK) status = poles_outside(s, gain, &list, &outside, err);
   for (size_t k = 0; k < list.count; k++) {
     if (cabs(list.item[k].z) > cabs(worst->z)) *worst = list.item[k];
   }

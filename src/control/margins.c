@@ -36,21 +36,66 @@ static bool above_unity(double log_gain) {
   return log_gain > 1e-6;
 }
 
-// Crossings between two neighbours: |L| by its logarithm, the angle linearly.
-static void between(pb_margins *m, double f0, double f1, double complex l0, double complex l1) {
-  double g0 = log(cabs(l0)), g1 = log(cabs(l1));
-  if (above_unity(g0) != above_unity(g1)) {
-    double part = fmin(fmax(g0 / (g0 - g1), 0), 1);
-    double turn = carg(l1 / l0);
-    at_unit_gain(m, f0 + part * (f1 - f0), l0 / cabs(l0) * cexp(CMPLX(0, part * turn)));
+// L near a few neighbours: (l + b x)/(1 + c x), x Hz from the first of them. Beside one resonance,
+// and far from all, L is very nearly of this form.
+typedef struct arc {
+  double complex l, b, c;
+} arc;
+
+// Through three points, at 0, x1 and x2; a straight line through the first two where there is none.
+static arc arc_through(double x1, double x2, double complex l0, double complex l1,
+                       double complex l2) {
+  double complex slope1 = (l1 - l0) / x1, slope2 = (l2 - l0) / x2;
+  double complex c = (slope1 - slope2) / (l2 - l1);
+  if (!isfinite(cabs(c))) c = 0;
+  return (arc){l0, slope1 + c * l1, c};
+}
+
+static double complex arc_at(const arc *a, double x) {
+  return (a->l + a->b * x) / (1 + a->c * x);
+}
+
+static bool is_above(double complex l) {
+  return above_unity(log(cabs(l)));
+}
+
+static bool is_beyond(double complex l) {
+  return angle_to_minus_one(l) > 0;
+}
+
+// Where a side changes between 0 and x1, by bisection.
+static double change(const arc *a, double x1, bool side(double complex)) {
+  double low = 0, high = x1;
+  bool first = side(a->l);
+  for (int k = 0; k < 50; k++) {
+    double middle = 0.5 * (low + high);
+    *(side(arc_at(a, middle)) == first ? &low : &high) = middle;
   }
-  double a0 = angle_to_minus_one(l0), a1 = angle_to_minus_one(l1);
-  // The same turn once more: from one side of the negative axis to the other, not through the
-  // positive one.
-  if ((a0 > 0) != (a1 > 0) && fabs(a1 - a0) < M_PI) {
-    double part = a0 / (a0 - a1);
-    at_real_axis(m, f0 + part * (f1 - f0), -exp(g0 + part * (g1 - g0)));
+  return high;
+}
+
+// Crossings between points f and f + 1.
+static void between(pb_margins *m, const double *hz, size_t nf, const double complex *l,
+                    size_t stride, size_t f) {
+  size_t third = f + 2 < nf ? f + 2 : f > 0 ? f - 1 : f + 1;
+  double complex l0 = l[f * stride], l1 = l[(f + 1) * stride], l2 = l[third * stride];
+  double x1 = hz[f + 1] - hz[f];
+  arc a = arc_through(x1, hz[third] - hz[f], l0, l1, l2);
+  if (is_above(l0) != is_above(l1)) {
+    double x = change(&a, x1, is_above);
+    at_unit_gain(m, hz[f] + x, arc_at(&a, x));
   }
+  // From one side of the negative axis to the other, not through the positive one.
+  double turn = angle_to_minus_one(l1) - angle_to_minus_one(l0);
+  if (is_beyond(l0) != is_beyond(l1) && fabs(turn) < M_PI) {
+    double x = change(&a, x1, is_beyond);
+    at_real_axis(m, hz[f] + x, creal(arc_at(&a, x)));
+  }
+}
+
+// At 0 Hz and at half the sample rate a loop is real: it reaches the axis without crossing it.
+static void at_end(pb_margins *m, double hz, double complex l) {
+  if (fabs(cimag(l)) < 1e-9 * cabs(l)) at_real_axis(m, hz, creal(l));
 }
 
 pb_margins pb_margins_of(const double *hz, size_t nf, const double complex *l, size_t stride) {
@@ -69,11 +114,10 @@ pb_margins pb_margins_of(const double *hz, size_t nf, const double complex *l, s
       m.modulus = distance;
       m.modulus_hz = hz[f];
     }
-    if (f > 0) between(&m, hz[f - 1], hz[f], l[(f - 1) * stride], here);
+    if (f + 1 < nf) between(&m, hz, nf, l, stride, f);
   }
-  // At half the sample rate a sampled loop is real: it reaches the axis there without crossing it.
-  double complex last = nf > 0 ? l[(nf - 1) * stride] : 0;
-  if (fabs(cimag(last)) < 1e-9 * cabs(last)) at_real_axis(&m, hz[nf - 1], creal(last));
+  if (nf > 0 && hz[0] == 0) at_end(&m, 0, l[0]);
+  if (nf > 0) at_end(&m, hz[nf - 1], l[(nf - 1) * stride]);
   return m;
 }
 

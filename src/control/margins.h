@@ -24,8 +24,9 @@ typedef struct pb_margins {
   double modulus, modulus_hz;      // min |1 + L|
 } pb_margins;
 
-// Margins of l[f · stride] at hz[nf], ascending: crossings are interpolated between neighbours, so
-// that the grid must be fine where L turns (pb_margins_grid). [any]
+// Margins of l[f · stride] at hz[nf], ascending: crossings lie on arcs through three neighbours, as
+// of one resonance, so that the grid must be fine where L turns (pb_margins_grid). The end of the
+// grid counts where L is real there, and 0 Hz where it is the begin. [any]
 pb_margins pb_margins_of(const double *hz, size_t nf, const double complex *l, size_t stride);
 
 // Ascending frequencies for margins, *hz [*count] owned by the caller: `points` even in logarithm

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/lapack.h"
+#include "control/assign.h"
 #include "control/margins.h"
 #include "signal/small_solve.h"
 
@@ -48,17 +49,15 @@ static pb_status eigenvalues(size_t n, const double complex *l, double complex *
   return info ? pb_fail(err, PB_ERR_NUMERIC, "margins", "eigenvalues: info %d", info) : PB_OK;
 }
 
-// Reorders now[n] so that each value continues the nearest of before[n].
-static void follow(size_t n, const double complex *before, double complex *now) {
-  for (size_t k = 0; k + 1 < n; k++) {
-    size_t nearest = k;
-    for (size_t j = k + 1; j < n; j++) {
-      if (cabs(now[j] - before[k]) < cabs(now[nearest] - before[k])) nearest = j;
-    }
-    double complex swap = now[k];
-    now[k] = now[nearest];
-    now[nearest] = swap;
-  }
+// Reorders now[n] so that its values together are nearest to before[n].
+static void follow(pb_assignment *a, const double complex *before, double complex *now,
+                   double complex *work) {
+  size_t n = a->rows;
+  for (size_t k = 0; k < n; k++)
+    for (size_t j = 0; j < n; j++) a->cost[k * n + j] = cabs(now[j] - before[k]);
+  pb_assignment_solve(a);
+  memcpy(work, now, n * sizeof *work);
+  for (size_t k = 0; k < n; k++) now[k] = work[a->column[k]];
 }
 
 static pb_status singular_values(size_t n, const double complex *l, double complex *work, double *s,
@@ -88,6 +87,7 @@ static void find_peaks(const double *hz, pb_mimo *m) {
 pb_status pb_mimo_analyse(const double *hz, size_t nf, size_t n, const double complex *l,
                           pb_mimo *out, pb_error *err) {
   *out = (pb_mimo){.nf = nf, .n = n};
+  pb_assignment pairs = {0};
   out->locus = malloc((nf * n + 1) * sizeof *out->locus);
   out->s = malloc((nf + 1) * sizeof *out->s);
   out->t = malloc((nf + 1) * sizeof *out->t);
@@ -96,14 +96,16 @@ pb_status pb_mimo_analyse(const double *hz, size_t nf, size_t n, const double co
   pb_status status = out->locus && out->s && out->t && out->margins && work
                          ? PB_OK
                          : pb_fail_memory(err, "margins");
+  if (status == PB_OK) status = pb_assignment_new(n, n, &pairs, err);
   for (size_t f = 0; f < nf && status == PB_OK; f++) {
     double complex *value = out->locus + f * n;
     status = eigenvalues(n, l + f * n * n, value, work, err);
-    if (status == PB_OK && f > 0) follow(n, value - n, value);
+    if (status == PB_OK && f > 0) follow(&pairs, value - n, value, work);
     if (status == PB_OK) {
       status = singular_values(n, l + f * n * n, work, &out->s[f], &out->t[f], err);
     }
   }
+  pb_assignment_clear(&pairs);
   free(work);
   if (status != PB_OK) {
     pb_mimo_clear(out);

@@ -1,11 +1,10 @@
-// Root locus and the search for the best gain: see rootlocus.h.
-#include "control/rootlocus.h"
-
+// Root locus: see rootlocus.h.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { SEARCH_GAINS = 41, REFINE_GAINS = 9, REFINE_ROUNDS = 2 };
+#include "control/pole_track.h"
+#include "control/rootlocus_internal.h"
 
 void pb_rootlocus_clear(pb_rootlocus *locus) {
   if (!locus) return;
@@ -16,7 +15,7 @@ void pb_rootlocus_clear(pb_rootlocus *locus) {
   *locus = (pb_rootlocus){0};
 }
 
-static pb_status allocate(size_t gains, size_t branches, pb_rootlocus *out, pb_error *err) {
+pb_status pb_rootlocus_new(size_t gains, size_t branches, pb_rootlocus *out, pb_error *err) {
   *out = (pb_rootlocus){.gains = gains, .branches = branches};
   out->gain = malloc(gains * sizeof *out->gain);
   out->pole = malloc((branches * gains + 1) * sizeof *out->pole);
@@ -27,39 +26,7 @@ static pb_status allocate(size_t gains, size_t branches, pb_rootlocus *out, pb_e
   return pb_fail_memory(err, "root locus");
 }
 
-// Where branch b should be at step k: on the line through its last two points, in z.
-static double complex predict(const pb_rootlocus *l, size_t b, size_t k) {
-  const pb_pole *p = l->pole + b * l->gains;
-  if (k < 2 || !(l->gain[k - 1] > l->gain[k - 2])) return p[k - 1].z;
-  double ratio = (l->gain[k] - l->gain[k - 1]) / (l->gain[k - 1] - l->gain[k - 2]);
-  // Steps that grow are extrapolated by at most as much as the last one.
-  return p[k - 1].z + fmin(ratio, 1) * (p[k - 1].z - p[k - 2].z);
-}
-
-// Gives each branch a pole of the list, closest pairs first; used[] has list->count entries.
-static void match(pb_rootlocus *l, size_t k, const pb_pole_list *list, bool *used) {
-  memset(used, 0, list->count * sizeof *used);
-  for (size_t b = 0; b < l->branches; b++) {
-    l->pole[b * l->gains + k] = (pb_pole){.z = 0, .hz = NAN, .damping = NAN};
-  }
-  for (size_t round = 0; round < l->branches; round++) {
-    double nearest = INFINITY;
-    size_t branch = 0, pole = 0;
-    for (size_t b = 0; b < l->branches; b++) {
-      if (!isnan(l->pole[b * l->gains + k].hz) || isnan(l->pole[b * l->gains + k - 1].hz)) continue;
-      double complex z = predict(l, b, k);
-      for (size_t p = 0; p < list->count; p++) {
-        double distance = used[p] ? INFINITY : cabs(list->item[p].z - z);
-        if (distance < nearest) nearest = distance, branch = b, pole = p;
-      }
-    }
-    if (!isfinite(nearest)) return;
-    l->pole[branch * l->gains + k] = list->item[pole];
-    used[pole] = true;
-  }
-}
-
-static void find_smallest(pb_rootlocus *l, size_t k) {
+void pb_rootlocus_find_smallest(pb_rootlocus *l, size_t k) {
   double smallest = INFINITY;
   for (size_t b = 0; b < l->branches; b++) {
     const pb_pole *p = &l->pole[b * l->gains + k];
@@ -68,41 +35,20 @@ static void find_smallest(pb_rootlocus *l, size_t k) {
   l->smallest[k] = smallest;
 }
 
-// Makes step k of all branches exact on the whole plant.
-static pb_status polish_step(pb_loop_solver *s, pb_rootlocus *l, size_t k, pb_error *err) {
-  pb_pole *pole = malloc((l->branches + 1) * sizeof *pole);
-  if (!pole) return pb_fail_memory(err, "root locus");
-  size_t count = 0;
-  for (size_t b = 0; b < l->branches; b++) {
-    if (!isnan(l->pole[b * l->gains + k].hz)) pole[count++] = l->pole[b * l->gains + k];
+pb_status pb_rootlocus_follow(pb_loop_solver *s, pb_rootlocus *l, pb_error *err) {
+  pb_pole_track track = {0};
+  double complex *z = malloc((l->branches + 1) * sizeof *z);
+  for (size_t b = 0; z && b < l->branches; b++) z[b] = l->pole[b * l->gains].z;
+  pb_status status = z ? pb_pole_track_start(s, l->gain[0], z, l->branches, &track, err)
+                       : pb_fail_memory(err, "root locus");
+  for (size_t k = 0; k < l->gains && status == PB_OK; k++) {
+    if (k > 0) status = pb_pole_track_advance(&track, l->gain[k], err);
+    for (size_t b = 0; k > 0 && b < l->branches && status == PB_OK; b++)
+      l->pole[b * l->gains + k] = pb_pole_track_get(&track, b);
+    if (status == PB_OK) pb_rootlocus_find_smallest(l, k);
   }
-  pb_status status = pb_loop_solver_polish(s, l->gain[k], pole, count, err);
-  count = 0;
-  for (size_t b = 0; b < l->branches && status == PB_OK; b++) {
-    if (!isnan(l->pole[b * l->gains + k].hz)) l->pole[b * l->gains + k] = pole[count++];
-  }
-  free(pole);
-  return status;
-}
-
-// Fills steps 1.. of a locus whose step 0 holds the starting poles. Branches are matched on the
-// estimates of all poles up to 2 f2, and only what was matched is made exact.
-static pb_status follow(pb_loop_solver *s, double f2, pb_rootlocus *l, pb_error *err) {
-  pb_status status = PB_OK;
-  find_smallest(l, 0);
-  for (size_t k = 1; k < l->gains && status == PB_OK; k++) {
-    pb_pole_list list = {0};
-    status = pb_loop_solver_estimate(s, l->gain[k], 0, 2 * f2, &list, err);
-    bool *used = status == PB_OK ? malloc(list.count + 1) : NULL;
-    if (status == PB_OK && !used) status = pb_fail_memory(err, "root locus");
-    if (status == PB_OK) {
-      match(l, k, &list, used);
-      status = polish_step(s, l, k, err);
-      find_smallest(l, k);
-    }
-    free(used);
-    pb_pole_list_clear(&list);
-  }
+  pb_pole_track_clear(&track);
+  free(z);
   return status;
 }
 
@@ -120,15 +66,15 @@ static bool is_plant_mode(const double complex *pole, size_t count, double rate,
 }
 
 // A locus of `gains` points whose branches start at the open-loop poles of the band.
-static pb_status start(pb_loop_solver *s, size_t gains, double f1, double f2, pb_rootlocus *out,
-                       pb_error *err) {
+pb_status pb_rootlocus_start(pb_loop_solver *s, size_t gains, double f1, double f2,
+                             pb_rootlocus *out, pb_error *err) {
   const pb_model *m = pb_loop_solver_loop(s)->model;
   pb_pole_list list = {0};
   double complex *pole = malloc((m->nx + 1) * sizeof *pole);
   pb_status status =
       pole ? pb_model_poles(m, PB_CONTINUOUS, pole, err) : pb_fail_memory(err, "root locus");
   if (status == PB_OK) status = pb_loop_solver_poles(s, 0, f1, f2, &list, err);
-  if (status == PB_OK) status = allocate(gains, list.count, out, err);
+  if (status == PB_OK) status = pb_rootlocus_new(gains, list.count, out, err);
   for (size_t b = 0; status == PB_OK && b < list.count; b++) {
     out->pole[b * gains] = list.item[b];
     out->is_mode[b] = is_plant_mode(pole, m->nx, m->sample_rate, f1, f2, list.item[b].z);
@@ -151,13 +97,13 @@ pb_status pb_rootlocus_compute(pb_loop_solver *s, const double *gain, size_t gai
   // Gain 0 is put in front when it is not there, and taken out again below.
   size_t extra = gain[0] > 0;
   pb_rootlocus l = {0};
-  pb_status status = start(s, gains + extra, f1, f2, &l, err);
+  pb_status status = pb_rootlocus_start(s, gains + extra, f1, f2, &l, err);
   if (status == PB_OK) {
     l.gain[0] = 0;
     memcpy(l.gain + extra, gain, gains * sizeof *gain);
-    status = follow(s, f2, &l, err);
+    status = pb_rootlocus_follow(s, &l, err);
   }
-  if (status == PB_OK) status = allocate(gains, l.branches, out, err);
+  if (status == PB_OK) status = pb_rootlocus_new(gains, l.branches, out, err);
   if (status == PB_OK) {
     memcpy(out->gain, gain, gains * sizeof *gain);
     memcpy(out->smallest, l.smallest + extra, gains * sizeof *out->smallest);
@@ -167,194 +113,5 @@ pb_status pb_rootlocus_compute(pb_loop_solver *s, const double *gain, size_t gai
     }
   }
   pb_rootlocus_clear(&l);
-  return status;
-}
-
-void pb_best_gain_clear(pb_best_gain *best) {
-  if (!best) return;
-  free(best->attainable);
-  free(best->attained_at);
-  *best = (pb_best_gain){0};
-}
-
-pb_status pb_loop_unit_gain(const pb_loop *loop, double f1, double f2, double *gain,
-                            pb_error *err) {
-  enum { POINTS = 25 };
-  size_t n = loop->controller->ny;
-  double hz[POINTS];
-  double complex *l = malloc(POINTS * n * n * sizeof *l);
-  if (!l) return pb_fail_memory(err, "best gain");
-  for (int k = 0; k < POINTS; k++) hz[k] = f1 * pow(f2 / f1, (k + 0.5) / POINTS);
-  pb_status status = pb_loop_gain(loop, 1, hz, POINTS, l, err);
-  double mean = 0;
-  for (size_t k = 0; status == PB_OK && k < POINTS; k++) {
-    double largest = 0;
-    for (size_t r = 0; r < n; r++) {
-      double sum = 0;
-      for (size_t c = 0; c < n; c++) sum += cabs(l[(k * n + r) * n + c]);
-      largest = fmax(largest, sum);
-    }
-    mean += log(largest) / POINTS;
-  }
-  free(l);
-  if (status == PB_OK && !isfinite(mean)) {
-    status = pb_fail(err, PB_ERR_STATE, "best gain", "the loop has no gain in %g … %g Hz", f1, f2);
-  }
-  *gain = exp(-mean);
-  return status;
-}
-
-// Index of the largest smallest damping among stable gains, or `gains` when there is none.
-static size_t best_of(const pb_rootlocus *l, const bool *unstable) {
-  size_t best = l->gains;
-  for (size_t k = 1; k < l->gains; k++) {
-    if (unstable[k]) continue;
-    if (best == l->gains || l->smallest[k] > l->smallest[best]) best = k;
-  }
-  return best;
-}
-
-static pb_status can_be_doubled(pb_loop_solver *s, double gain, bool *yes, pb_error *err) {
-  return pb_loop_solver_stable(s, 2 * gain, yes, NULL, err);
-}
-
-// Leaves out gains that cannot be doubled, as all poles of the whole plant say. Instability is
-// taken to stay once it is there, so that the last good gain up to the best one is found by
-// bisection; *limit is then where between it and the next one doubling ends, to 0.5 %.
-static pb_status keep_margin(pb_loop_solver *s, const pb_rootlocus *l, bool *unstable,
-                             double *limit, pb_error *err) {
-  size_t bad = best_of(l, unstable), good = 0;
-  bool yes;
-  *limit = INFINITY;
-  if (bad == l->gains) return PB_OK;
-  pb_status status = can_be_doubled(s, l->gain[bad], &yes, err);
-  if (status != PB_OK) return status;
-  if (yes) good = bad++;
-  while (bad - good > 1 && status == PB_OK) {
-    size_t middle = (good + bad) / 2;
-    status = can_be_doubled(s, l->gain[middle], &yes, err);
-    if (yes)
-      good = middle;
-    else
-      bad = middle;
-  }
-  for (size_t k = good + 1; k < l->gains; k++) unstable[k] = true;
-  double low = l->gain[good], high = bad < l->gains ? l->gain[bad] : low;
-  if (status == PB_OK) status = can_be_doubled(s, high, &yes, err);
-  if (yes) low = high;
-  while (status == PB_OK && high > 1.005 * low && low > 0) {
-    double middle = sqrt(low * high);
-    status = can_be_doubled(s, middle, &yes, err);
-    *(yes ? &low : &high) = middle;
-  }
-  *limit = low;
-  return status;
-}
-
-// Modes that no gain damps beyond 1 % and three times what they have are not counted against a
-// gain.
-static void forget_unreachable(pb_rootlocus *l) {
-  bool *counts = l->is_mode;
-  size_t reachable = 0;
-  for (int pass = 0; pass < 2; pass++) {
-    for (size_t b = 0; b < l->branches; b++) {
-      const pb_pole *p = l->pole + b * l->gains;
-      double most = 0;
-      for (size_t k = 1; k < l->gains; k++) {
-        if (p[k].damping > most) most = p[k].damping;
-      }
-      bool reached = l->is_mode[b] && most > 0.01 && most > 3 * p[0].damping;
-      if (pass == 0) reachable += reached;
-      if (pass == 1 && reachable > 0) counts[b] = reached;
-    }
-  }
-  for (size_t k = 0; k < l->gains; k++) find_smallest(l, k);
-}
-
-// Repeats the search between the neighbours of the best gain, starting from the lower one's poles.
-// Not beyond `limit`.
-static pb_status refine(pb_loop_solver *s, double f2, const pb_rootlocus *from, double limit,
-                        size_t best, unsigned rounds, pb_best_gain *out, pb_error *err) {
-  size_t low = best - 1, high = best + 1 < from->gains ? best + 1 : best;
-  out->gain = from->gain[best];
-  out->smallest_damping = from->smallest[best];
-  if (rounds == 0) return PB_OK;
-  pb_rootlocus l;
-  const bool allowed[REFINE_GAINS] = {false};
-  pb_status status = allocate(REFINE_GAINS, from->branches, &l, err);
-  if (status != PB_OK) return status;
-  memcpy(l.is_mode, from->is_mode, l.branches * sizeof *l.is_mode);
-  for (size_t b = 0; b < l.branches; b++) l.pole[b * l.gains] = from->pole[b * from->gains + low];
-  double g1 = from->gain[low], g2 = fmin(from->gain[high], limit);
-  for (size_t k = 0; k < l.gains; k++) {
-    l.gain[k] = g1 + (g2 - g1) * (double)k / (double)(l.gains - 1);
-  }
-  status = follow(s, f2, &l, err);
-  size_t finer = status == PB_OK ? best_of(&l, allowed) : l.gains;
-  if (finer < l.gains && l.smallest[finer] >= from->smallest[best]) {
-    status = refine(s, f2, &l, limit, finer, rounds - 1, out, err);
-  }
-  pb_rootlocus_clear(&l);
-  return status;
-}
-
-static pb_status attainable(const pb_rootlocus *l, const bool *unstable, pb_best_gain *out,
-                            pb_error *err) {
-  for (size_t b = 0; b < l->branches; b++) out->modes += l->is_mode[b];
-  out->attainable = malloc((out->modes + 1) * sizeof *out->attainable);
-  out->attained_at = malloc((out->modes + 1) * sizeof *out->attained_at);
-  if (!out->attainable || !out->attained_at) return pb_fail_memory(err, "best gain");
-  size_t mode = 0;
-  for (size_t b = 0; b < l->branches; b++) {
-    if (!l->is_mode[b]) continue;
-    const pb_pole *p = l->pole + b * l->gains;
-    out->attainable[mode] = p[0].damping;
-    out->attained_at[mode] = 0;
-    for (size_t k = 1; k < l->gains; k++) {
-      if (unstable[k] || !(p[k].damping > out->attainable[mode])) continue;
-      out->attainable[mode] = p[k].damping;
-      out->attained_at[mode] = l->gain[k];
-    }
-    mode++;
-  }
-  return PB_OK;
-}
-
-pb_status pb_best_gain_find(pb_loop_solver *s, double f1, double f2, double decades,
-                            pb_best_gain *out, pb_error *err) {
-  *out = (pb_best_gain){0};
-  if (!(f1 > 0 && f1 < f2 && isfinite(f2)) || !(decades >= 0 && decades < 10)) {
-    return pb_fail(err, PB_ERR_ARGUMENT, "best gain", "band %g … %g Hz, %g decades", f1, f2,
-                   decades);
-  }
-  if (decades == 0) decades = 2;
-  double unit = 1, limit = INFINITY;
-  pb_rootlocus l = {0};
-  bool unstable[SEARCH_GAINS] = {false};
-  pb_status status = pb_loop_unit_gain(pb_loop_solver_loop(s), f1, f2, &unit, err);
-  if (status == PB_OK) status = start(s, SEARCH_GAINS, f1, f2, &l, err);
-  if (status != PB_OK) goto done;
-  l.gain[0] = 0;
-  for (size_t k = 1; k < l.gains; k++) {
-    double step = (double)(k - 1) / (SEARCH_GAINS - 2);
-    l.gain[k] = unit * pow(10, decades * (2 * step - 1));
-  }
-  status = follow(s, f2, &l, err);
-  if (status == PB_OK) {
-    forget_unreachable(&l);
-    status = keep_margin(s, &l, unstable, &limit, err);
-  }
-  if (status == PB_OK) status = attainable(&l, unstable, out, err);
-  if (status != PB_OK) goto done;
-  size_t best = best_of(&l, unstable);
-  if (out->modes == 0 || best == l.gains || l.smallest[best] <= 0) {
-    status = pb_fail(err, PB_ERR_STATE, "best gain",
-                     "%zu modes in %g … %g Hz, none damped by a stable gain", out->modes, f1, f2);
-    goto done;
-  }
-  status = refine(s, f2, &l, limit, best, REFINE_ROUNDS, out, err);
-done:
-  pb_rootlocus_clear(&l);
-  if (status != PB_OK) pb_best_gain_clear(out);
   return status;
 }

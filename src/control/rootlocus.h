@@ -8,15 +8,16 @@
 typedef struct pb_rootlocus {
   size_t gains, branches;
   double *gain;      // [gains]
-  pb_pole *pole;     // [branches][gains]; a branch that was lost ends in hz = NaN
+  pb_pole *pole;     // [branches][gains]; hz = NaN where it is lost
   bool *is_mode;     // [branches] starts at an oscillatory pole of the plant (damping < 0.7)
   double *smallest;  // [gains] smallest damping of the modes; −1 where one is lost
 } pb_rootlocus;
 
 // Branches start at the poles with f1 ≤ |s|/2π ≤ f2 of the loop at zero gain, and are continued
-// along ascending gain[0..gains−1] (the first is usually 0) by matching to the nearest pole,
-// extrapolated. [init] PB_ERR_ARGUMENT (gains not ascending, empty band), and as
-// pb_loop_solver_poles.
+// along ascending gain[0..gains−1] (the first is usually 0), wherever they lead (pole_track.h). Of
+// a pair that meets on the real axis a branch goes on with one of the two real poles. A pole is
+// lost where it vanishes in z = 0, or where the iteration on a large plant leads nowhere. [init]
+// PB_ERR_ARGUMENT (gains not ascending, empty band), and as pb_loop_solver_poles.
 pb_status pb_rootlocus_compute(pb_loop_solver *solver, const double *gain, size_t gains, double f1,
                                double f2, pb_rootlocus *out, pb_error *err);
 

@@ -149,6 +149,18 @@ static bool polish(finder *f, double complex *s) {
   return cabs(step) < 1e-7 * scale_of(f, at) && doubt < 1e-3 * scale_of(f, at);
 }
 
+// Two modes of one frequency are one to a single channel: between their poles, a rounding error
+// apart, H passes through 0, but a hair beside that it is not what its slope there says.
+static bool is_cancelled(finder *f, double complex s) {
+  double complex step, slope;
+  double doubt, hair = 1e-7 * scale_of(f, s);
+  size_t last = f->channel->m - 1;
+  if (!newton_step(f, s, &step, &doubt)) return false;
+  slope = project(f, f->dh, last);
+  if (!newton_step(f, s + hair, &step, &doubt)) return false;
+  return f->sigma[last] < 0.1 * cabs(slope) * hair;
+}
+
 // How many zeros lie at a polished one: the singular values that vanish there.
 static size_t multiplicity(finder *f, double complex s) {
   double complex step;
@@ -188,7 +200,7 @@ static void polish_all(finder *f, const double complex *candidate, size_t count,
     if (zero_at_origin(f, s)) {
       accept(f, 0);
       if (cimag(s) > 0) accept(f, 0);
-    } else if (polish(f, &s) && (band <= 0 || cimag(s) <= band)) {
+    } else if (polish(f, &s) && (band <= 0 || cimag(s) <= band) && !is_cancelled(f, s)) {
       accept(f, s);
     }
   }

@@ -78,6 +78,7 @@ size_t pb_periodic_count(const pb_periodic *p, size_t experiment) {
 
 void pb_periodic_break(pb_periodic *p) {
   p->fill = 0;
+  p->gap = true;
 }
 
 // Lines of all signals, scaled to amplitudes; two real signals share one transform.
@@ -120,10 +121,11 @@ static void average_period(pb_periodic *p) {
 bool pb_periodic_push(pb_periodic *p, size_t experiment, const double *u, const double *y) {
   size_t n = p->options.period;
   if (experiment >= p->options.experiments || p->settled) return false;
-  if (experiment != p->current) {
+  if (experiment != p->current || p->gap) {
     p->current = experiment;
     p->fill = 0;
-    if (p->count[experiment] > 0) p->broken[experiment] = true;  // a second time round
+    p->gap = false;
+    if (p->count[experiment] > 0) p->broken[experiment] = true;  // later than right after the last
   }
   for (size_t i = 0; i < p->nu; i++) p->record[i * n + p->fill] = u[i];
   for (size_t o = 0; o < p->ny; o++) p->record[(p->nu + o) * n + p->fill] = y[o];

@@ -54,8 +54,9 @@ pb_status pb_periodic_difference(const pb_periodic *periodic, pb_frf *out, pb_er
 // so that c follows from D by least squares over the lines, and the means lose Σ_p T_p / P.
 // The scatter becomes that of D's remainder. pole[poles]: one of each conjugate pair (Im z > 0), or
 // real, as z. *explained is the part of D's power that the poles explain; below 0.5 nothing is
-// changed. Estimates after this; pushing further periods is not possible any more. [init] Fails
-// with PB_ERR_STATE as above, PB_ERR_NUMERIC (LAPACK), PB_ERR_MEMORY.
+// changed, nor where experiments have different numbers of periods. Estimates after this; pushing
+// further periods is not possible any more. [init] Fails with PB_ERR_STATE as above, PB_ERR_NUMERIC
+// (LAPACK), PB_ERR_MEMORY.
 pb_status pb_periodic_settle(pb_periodic *periodic, const double complex *pole, size_t poles,
                              double *explained, pb_error *err);
 

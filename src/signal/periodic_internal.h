@@ -20,6 +20,7 @@ struct pb_periodic {
   double complex *first_period;  // [experiments][ny][lines]
   double complex *last_period;   // [experiments][ny][lines]
   bool *broken;                  // [experiments] its periods do not follow one another
+  bool gap;                      // the next sample does not follow the last
   bool settled;                  // means and scatter have been corrected
 };
 

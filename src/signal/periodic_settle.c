@@ -176,11 +176,17 @@ static void correct(pb_periodic *p, const double *difference, const double *mean
   p->settled = true;
 }
 
+static bool equally_long(const pb_periodic *p) {
+  for (size_t e = 1; e < p->options.experiments; e++)
+    if (p->count[e] != p->count[0]) return false;
+  return true;
+}
+
 pb_status pb_periodic_settle(pb_periodic *p, const double complex *pole, size_t poles,
                              double *explained, pb_error *err) {
   *explained = 0;
   pb_status status = check(p, err);
-  if (status != PB_OK || poles == 0) return status;
+  if (status != PB_OK || poles == 0 || !equally_long(p)) return status;
   size_t n = unknowns(pole, poles), rows = 2 * p->lines, series = p->options.experiments * p->ny;
   if (n >= rows) return PB_OK;
   double *difference = malloc(rows * n * sizeof *difference),

@@ -23,7 +23,7 @@ typedef struct pb_apa_landmarks {
 
 // Responses to tune to: a frf of one input V_a and the outputs y, V_s, in this order.
 typedef struct pb_apa_data {
-  pb_frf frf;          // variance all 0 where it is not known
+  pb_frf frf;          // ascending frequencies > 0; variance all 0 where it is not known
   double sample_rate;  // Hz; 0: responses in continuous time
 } pb_apa_data;         // free with pb_apa_data_clear
 

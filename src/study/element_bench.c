@@ -66,7 +66,7 @@ typedef struct actuator {
   const pb_element_source *source;
   bool element;
   bool voltage, sensor, inner;  // has g_a, g_s, and a place for a force inside
-  char stack[2][64];            // names of the outermost ends of an element's stacks; empty: none
+  char stack[2][256];           // names of the outermost ends of an element's stacks; empty: none
   double axis[3];
   double top[3];  // m
 } actuator;
@@ -87,6 +87,16 @@ static void outermost(const pb_plant *plant, const pb_component *c, actuator *ou
     }
 }
 
+// A name inside a JSON string.
+static void add_name(pb_text *text, const char *name) {
+  for (; *name; name++) {
+    if ((unsigned char)*name < ' ')
+      pb_text_format(text, "\\u%04x", (unsigned)*name);
+    else
+      pb_text_format(text, *name == '"' || *name == '\\' ? "\\%c" : "%c", *name);
+  }
+}
+
 static void add_signals(pb_text *text, const actuator *a, const char *top) {
   pb_text_append(text, ",\"inputs\":[");
   if (a->voltage)
@@ -99,11 +109,14 @@ static void add_signals(pb_text *text, const actuator *a, const char *top) {
                  top);
   if (a->sensor)
     pb_text_append(text, "{\"name\":\"Vs\",\"type\":\"sensor_voltage\",\"component\":\"part\"},");
-  if (a->stack[0][0])
-    pb_text_format(text,
-                   "{\"name\":\"e\",\"type\":\"relative_displacement\",\"from\":\"part.%s\",\"to\":"
-                   "\"part.%s\",\"direction\":[%.17g,%.17g,%.17g]},",
-                   a->stack[0], a->stack[1], a->axis[0], a->axis[1], a->axis[2]);
+  if (a->stack[0][0]) {
+    pb_text_append(text, "{\"name\":\"e\",\"type\":\"relative_displacement\",\"from\":\"part.");
+    add_name(text, a->stack[0]);
+    pb_text_append(text, "\",\"to\":\"part.");
+    add_name(text, a->stack[1]);
+    pb_text_format(text, "\",\"direction\":[%.17g,%.17g,%.17g]},", a->axis[0], a->axis[1],
+                   a->axis[2]);
+  }
   pb_text_format(text,
                  "{\"name\":\"y\",\"type\":\"displacement\",\"frame\":\"%s\",\"direction\":[0,0,1]}"
                  "]}",

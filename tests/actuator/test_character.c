@@ -96,6 +96,28 @@ static void an_element_with_stacks(void **state) {
   unlink(file);
 }
 
+// The bench is a plant file of its own, in which the names of the stacks' frames stand.
+static void names_of_frames_are_quoted(void **state) {
+  (void)state;
+  char file[64], text[1000];
+  write_column(file, sizeof file);
+  snprintf(text, sizeof text,
+           "{\"models\":{\"a\":{\"type\":\"super_element\",\"file\":\"%s\",\"ends\":[1,5],"
+           "\"modal_damping\":0.01,\"g_a\":20,\"frames\":{\"low \\\"\\\\\":{\"node\":2}},"
+           "\"stacks\":{\"actuator\":{\"frames\":[\"low \\\"\\\\\",\"3\"],\"axis\":[0,0,1]}}}}}",
+           file);
+  pb_element_source source;
+  pb_actuator_character c;
+  pb_bench_model bench = {0};
+  REQUIRE(
+      pb_element_source_plant(text, "p.json", NULL, "a", pb_element_is_actuator, &source, &err));
+  REQUIRE(pb_actuator_characterize(&source, &nominal, NULL, &bench, &c, &err));
+  ASSERT_RELATIVE(c.amplification, 1, 1e-6);
+  pb_bench_model_clear(&bench);
+  pb_element_source_clear(&source);
+  unlink(file);
+}
+
 // ---- a beam as a joint --------------------------------------------------------------------------
 
 // Cantilever: F L³/3EI, M L/EI, F L/EA, M L/GJ; bending and shear are coupled by √3/2.
@@ -246,6 +268,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(the_2dof_actuator),
       cmocka_unit_test(an_element_with_stacks),
+      cmocka_unit_test(names_of_frames_are_quoted),
       cmocka_unit_test(a_beam_is_a_joint),
       cmocka_unit_test(a_lumped_joint),
       cmocka_unit_test(piezo_constants),

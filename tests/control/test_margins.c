@@ -65,6 +65,46 @@ static void test_edges(void **state) {
   ASSERT_NEAR(m.gain_up_hz, 3, 0);
 }
 
+// k/(s (s² + 2ζω s + ω²)) meets the axis at ω, where it turns by a right angle within the width of
+// the resonance: a grid as fine as that width finds it all the same. With a constant negative gain
+// it begins on the axis.
+static void test_resonance(void **state) {
+  (void)state;
+  const double f0 = 100, w = 2 * M_PI * f0, zeta = 1e-3, k = 0.5 * 2 * zeta * w * w * w;
+  double f[21];
+  double complex l[21];
+  for (int j = 0; j < 21; j++) {
+    f[j] = f0 * (1 + 2 * zeta * (j - 10.3));
+    double complex s = CMPLX(0, 2 * M_PI * f[j]);
+    l[j] = k / (s * (s * s + 2 * zeta * w * s + w * w));
+  }
+  pb_margins m = pb_margins_of(f, 21, l, 1);
+  ASSERT_RELATIVE(m.gain_up, 2, 1e-4);
+  ASSERT_RELATIVE(m.gain_up_hz, f0, 1e-6);
+  for (int j = 0; j < 21; j++) {
+    f[j] = 0.1 * j;
+    l[j] = -0.2 / (1 + CMPLX(0, f[j]));
+  }
+  m = pb_margins_of(f, 21, l, 1);
+  ASSERT_RELATIVE(m.gain_up, 5, 1e-12);
+  ASSERT_NEAR(m.gain_up_hz, 0, 0);
+}
+
+// Two loci of which one steps past the other: each goes on where that is nearest for both together.
+static void test_swaps(void **state) {
+  (void)state;
+  const double f[3] = {1, 2, 3};
+  const double complex l[12] = {0, 0, 0, 1, -5, 0, 0, 1.1, -10, 0, 0, 1.2};
+  pb_mimo m;
+  REQUIRE(pb_mimo_analyse(f, 3, 2, l, &m, &err));
+  size_t fast = cabs(m.locus[0]) < 0.5 ? 0 : 1;
+  for (size_t k = 0; k < 3; k++) {
+    ASSERT_NEAR(creal(m.locus[2 * k + fast]), -5.0 * (double)k, 1e-12);
+    ASSERT_NEAR(creal(m.locus[2 * k + 1 - fast]), 1 + 0.1 * (double)k, 1e-12);
+  }
+  pb_mimo_clear(&m);
+}
+
 // L = V diag(l₁, l₂) V⁻¹: the loci are l₁ and l₂ although the loops are coupled, and the worst
 // direction is worse than either.
 static void test_loci(void **state) {
@@ -130,6 +170,8 @@ static void test_grid(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_third_order), cmocka_unit_test(test_conditional),
-      cmocka_unit_test(test_edges), cmocka_unit_test(test_loci), cmocka_unit_test(test_grid)};
+      cmocka_unit_test(test_edges),       cmocka_unit_test(test_resonance),
+      cmocka_unit_test(test_swaps),       cmocka_unit_test(test_loci),
+      cmocka_unit_test(test_grid)};
   return cmocka_run_group_tests(tests, make_grid, NULL);
 }

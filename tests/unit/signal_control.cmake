@@ -4,6 +4,8 @@ pb_test(excitation LABELS unit SOURCES test_excitation.c)
 pb_test(spectrum LABELS unit SOURCES test_spectrum.c)
 pb_test(lti LABELS unit SOURCES test_lti.c)
 pb_test(loop LABELS unit SOURCES test_loop.c)
+pb_test(rootlocus LABELS unit SOURCES test_rootlocus.c)
+pb_test(stable LABELS unit SOURCES test_stable.c)
 pb_test(fit LABELS unit SOURCES test_fit.c)
 
 # Experiments of plantbus-identify and plantbus-iff, on a plant stepped in the test.

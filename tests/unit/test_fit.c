@@ -214,10 +214,28 @@ static void test_refusals(void **state) {
   pb_model_free(m);
 }
 
+// The highest order that the lines allow, odd: it is spread as one pole more.
+static void test_odd_order(void **state) {
+  (void)state;
+  const double in[1] = {1}, out[1] = {1e5};
+  test_mode mode[3] = {{20, 0.02, in, out}, {45, 0.02, in, out}, {80, 0.02, in, out}};
+  pb_model *m = test_model(mode, 3, 1, 1, RATE, NULL);
+  pb_frf frf = exact_frf(m, 10, 10, 9, 0);
+  pb_fit_channel channel = {0, 0};
+  pb_fit_options options = {.sample_rate = RATE, .poles = 7};
+  pb_fit fit;
+  assert_int_equal(pb_fit_frf(&frf, &channel, 1, &options, &fit, NULL), PB_OK);
+  for (size_t k = 0; k < 3; k++) check_mode(&fit, mode[k].hz, 0.02, 1e-3);
+  pb_fit_clear(&fit);
+  pb_frf_clear(&frf);
+  pb_model_free(m);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_siso),  cmocka_unit_test(test_near_pairs), cmocka_unit_test(test_noisy),
-      cmocka_unit_test(test_welch), cmocka_unit_test(test_refusals),
+      cmocka_unit_test(test_siso),      cmocka_unit_test(test_near_pairs),
+      cmocka_unit_test(test_noisy),     cmocka_unit_test(test_welch),
+      cmocka_unit_test(test_odd_order), cmocka_unit_test(test_refusals),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

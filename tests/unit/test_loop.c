@@ -227,6 +227,7 @@ static void test_best_gain(void **state) {
   }
   assert_true(fabs(best.gain / (wp * sqrt(wp / wz)) - 1) < 0.03);
   assert_int_equal(best.modes, 1);
+  assert_true(best.attainable[0] >= best.smallest_damping);
   pb_best_gain_clear(&best);
   pb_loop_solver_free(solver);
   pb_lti_free(&controller);

@@ -264,12 +264,38 @@ static void test_periodic_refusals(void **state) {
   pb_periodic_free(periodic);
 }
 
+// A gap parts a decay; of experiments that are not equally long nothing is taken out.
+static void test_periodic_gaps(void **state) {
+  (void)state;
+  const pb_periodic_options options = {100, 10, 2, 10, 40};
+  pb_periodic *periodic;
+  pb_frf frf;
+  assert_int_equal(pb_periodic_new(&options, 1, 1, &periodic, NULL), PB_OK);
+  for (size_t e = 0; e < 2; e++) {
+    for (int k = 0; k < 7; k++) pb_periodic_push(periodic, e, (double[]){0}, (double[]){0});
+    pb_periodic_break(periodic);
+    for (size_t k = 0; k < 20 + 10 * e; k++)
+      pb_periodic_push(periodic, e, (double[]){k % 10 == 0}, (double[]){pow(0.9, (double)k)});
+  }
+  assert_int_equal(pb_periodic_difference(periodic, &frf, NULL), PB_OK);
+  pb_frf_clear(&frf);
+  double explained = 1;
+  assert_int_equal(pb_periodic_settle(periodic, (double complex[]){0.9}, 1, &explained, NULL),
+                   PB_OK);
+  assert_true(explained == 0);
+  pb_periodic_break(periodic);
+  for (int k = 0; k < 10; k++) pb_periodic_push(periodic, 1, (double[]){k == 0}, (double[]){1});
+  assert_int_equal(pb_periodic_difference(periodic, &frf, NULL), PB_ERR_STATE);
+  pb_periodic_free(periodic);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_windows),        cmocka_unit_test(test_welch_mimo),
       cmocka_unit_test(test_h1_h2),          cmocka_unit_test(test_welch_gap_and_refusals),
       cmocka_unit_test(test_unexcited),      cmocka_unit_test(test_periodic_exact),
       cmocka_unit_test(test_periodic_noise), cmocka_unit_test(test_periodic_refusals),
+      cmocka_unit_test(test_periodic_gaps),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

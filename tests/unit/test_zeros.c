@@ -173,6 +173,24 @@ static void test_unseen(void **state) {
   sketch_free(&k);
 }
 
+// Two modes of one frequency but for rounding: to a single channel they are one, of which the sum
+// of both makes the zero.
+static void test_double_mode(void **state) {
+  (void)state;
+  for (int split = 0; split < 3; split++) {
+    sketch k = sketch_new(2, 1, 1);
+    const double p = 588.7, z = 245, q = p * (1 + 3e-16 * pow(30, split));
+    add_mode(&k, p, 0.01, 0.3 * (z * z - p * p), 0, NULL, NULL);
+    add_mode(&k, q, 0.01, 0.7 * (z * z - p * p), 0, NULL, NULL);
+    k.model.d[0] = 1;
+    result r = find_zeros(&k.model, 1, 0);
+    assert_int_equal(r.count, 2);
+    check_zero(r.zero[0], root(z, 0.01 * p / z), 1e-9);
+    free(r.zero);
+    sketch_free(&k);
+  }
+}
+
 // Collocated force and displacement: between two neighbouring poles lies exactly one zero. Modes
 // from 40 Hz to 300 kHz with positive weights of several magnitudes; all found, each in its gap.
 static sketch collocated(size_t modes) {
@@ -291,11 +309,11 @@ static void test_refusals(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_biquad),   cmocka_unit_test(test_no_zeros),
-      cmocka_unit_test(test_far_zero), cmocka_unit_test(test_origin),
-      cmocka_unit_test(test_unseen),   cmocka_unit_test(test_interlacing),
-      cmocka_unit_test(test_large),    cmocka_unit_test(test_square),
-      cmocka_unit_test(test_refusals),
+      cmocka_unit_test(test_biquad),      cmocka_unit_test(test_no_zeros),
+      cmocka_unit_test(test_far_zero),    cmocka_unit_test(test_origin),
+      cmocka_unit_test(test_unseen),      cmocka_unit_test(test_double_mode),
+      cmocka_unit_test(test_interlacing), cmocka_unit_test(test_large),
+      cmocka_unit_test(test_square),      cmocka_unit_test(test_refusals),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
