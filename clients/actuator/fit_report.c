@@ -1,5 +1,4 @@
 // The report of plantbus-actuator fit: tables, JSON, files, the model, and the plots of figure 2.5.
-#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -55,16 +54,11 @@ static pb_status write_model(const fit_result *r, const char *path, pb_error *er
   pb_outfile file = {0};
   cJSON *model = fit_model(r);
   pb_status st = model ? pb_json_print(model, &text, err) : pb_fail_memory(err, path);
-  if (!st) st = pb_outfile_create(path, &file, err);
-  FILE *stream = st ? NULL : fopen(file.temp, "w");
-  if (!st && !stream) st = pb_fail(err, PB_ERR_IO, path, "%s", strerror(errno));
-  if (stream) {
-    bool failed = fprintf(stream, "%s\n", text) < 0;
-    failed = fclose(stream) != 0 || failed;
-    if (failed) st = pb_fail(err, PB_ERR_IO, path, "%s", strerror(errno));
+  if (!st) st = pb_outfile_open(path, &file, err);
+  if (!st) {
+    fputs(text, file.stream);
+    st = pb_outfile_close(&file, err);
   }
-  if (!st) st = pb_outfile_commit(&file, err);
-  pb_outfile_discard(&file);
   free(text);
   cJSON_Delete(model);
   return st;

@@ -15,7 +15,6 @@
 
 typedef struct pb_csv {
   pb_outfile file;
-  FILE *stream;
   size_t columns, cells;
 } pb_csv;
 

@@ -1,21 +1,26 @@
 // MAT v5 files by way of matio: see matfile.h.
 //
 // matio does not tell when a write fails (it patches the size of each element to what reached the
-// file), so the bytes that the variables need are counted and the file is measured at the end.
+// file), so the bytes that the variables need are counted and the file is measured at the end. As
+// it also goes back in the file, what is no regular file (a pipe, a device) gets a copy of one.
 #include "matfile.h"
 
 #include <ctype.h>
+#include <errno.h>
 #include <matio.h>
 #include <stdbool.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "outfile.h"
 
 struct pb_matfile {
   pb_outfile file;
+  char scratch[32];  // what is copied to file at the end; "": file itself is written
   mat_t *mat;
   size_t needed;   // bytes of data handed to matio, at least
   pb_error error;  // the first failure; code PB_OK: none
@@ -23,15 +28,29 @@ struct pb_matfile {
 
 enum { HEADER = 128 };
 
+static pb_status make_scratch(pb_matfile *mat, pb_error *err) {
+  snprintf(mat->scratch, sizeof mat->scratch, "/tmp/plantbus-XXXXXX");
+  int fd = mkstemp(mat->scratch);
+  if (fd >= 0) close(fd);
+  if (fd >= 0) return PB_OK;
+  mat->scratch[0] = 0;
+  return pb_fail(err, PB_ERR_IO, mat->file.path, "no temporary file: %s", strerror(errno));
+}
+
+static const char *written_path(const pb_matfile *mat) {
+  return mat->scratch[0] ? mat->scratch : mat->file.temp;
+}
+
 pb_status pb_matfile_open(const char *path, pb_matfile **out, pb_error *err) {
   *out = NULL;
   pb_matfile *made = calloc(1, sizeof *made);
   if (!made) return pb_fail_memory(err, path);
   made->needed = HEADER;
   pb_status status = pb_outfile_create(path, &made->file, err);
+  if (!status && made->file.direct) status = make_scratch(made, err);
   if (!status) {
     // A header of our own has no date in it: the same data give the same bytes.
-    made->mat = Mat_CreateVer(made->file.temp,
+    made->mat = Mat_CreateVer(written_path(made),
                               "MATLAB 5.0 MAT-file, created by plantbus " PB_VERSION, MAT_FT_MAT5);
     if (!made->mat) status = pb_fail(err, PB_ERR_IO, path, "cannot be written");
   }
@@ -171,11 +190,25 @@ void pb_matfile_names(pb_matfile *mat, const char *name, const char *const *text
 
 static void check_size(pb_matfile *mat) {
   struct stat info;
-  bool known = stat(mat->file.temp, &info) == 0;
-  if (mat->error.code || (known && !S_ISREG(info.st_mode))) return;
-  if (!known || (size_t)info.st_size < mat->needed) {
+  if (mat->error.code) return;
+  if (stat(written_path(mat), &info) || (size_t)info.st_size < mat->needed) {
     pb_fail(&mat->error, PB_ERR_IO, mat->file.path, "cannot be written: is the disk full?");
   }
+}
+
+static pb_status copy_scratch(pb_matfile *mat, pb_error *err) {
+  pb_outfile out;
+  char part[4096];
+  size_t n;
+  pb_status status = pb_outfile_open(mat->file.path, &out, err);
+  if (status) return status;
+  FILE *from = fopen(mat->scratch, "rb");
+  while (from && (n = fread(part, 1, sizeof part, from)) > 0) fwrite(part, 1, n, out.stream);
+  bool read = from && !ferror(from);
+  if (from) fclose(from);
+  if (read) return pb_outfile_close(&out, err);
+  pb_outfile_discard(&out);
+  return pb_fail(err, PB_ERR_IO, mat->file.path, "its temporary file cannot be read");
 }
 
 pb_status pb_matfile_close(pb_matfile *mat, pb_error *err) {
@@ -183,11 +216,9 @@ pb_status pb_matfile_close(pb_matfile *mat, pb_error *err) {
   mat->mat = NULL;
   check_size(mat);
   pb_status status = mat->error.code;
-  if (status) {
-    if (err) *err = mat->error;
-  } else {
-    status = pb_outfile_commit(&mat->file, err);
-  }
+  if (status && err) *err = mat->error;
+  if (!status && mat->scratch[0]) status = copy_scratch(mat, err);
+  if (!status) status = pb_outfile_commit(&mat->file, err);
   pb_matfile_discard(mat);
   return status;
 }
@@ -195,6 +226,7 @@ pb_status pb_matfile_close(pb_matfile *mat, pb_error *err) {
 void pb_matfile_discard(pb_matfile *mat) {
   if (!mat) return;
   if (mat->mat) Mat_Close(mat->mat);
+  if (mat->scratch[0]) unlink(mat->scratch);
   pb_outfile_discard(&mat->file);
   free(mat);
 }

@@ -51,6 +51,29 @@ pb_status pb_outfile_create(const char *path, pb_outfile *out, pb_error *err) {
   return PB_OK;
 }
 
+pb_status pb_outfile_open(const char *path, pb_outfile *out, pb_error *err) {
+  pb_status status = pb_outfile_create(path, out, err);
+  if (status) return status;
+  out->stream = fopen(out->temp, "w");
+  if (out->stream) return PB_OK;
+  status = fail_errno(err, path, "cannot be written");
+  pb_outfile_discard(out);
+  return status;
+}
+
+pb_status pb_outfile_close(pb_outfile *out, pb_error *err) {
+  errno = 0;
+  bool failed = ferror(out->stream) != 0;
+  failed = fclose(out->stream) != 0 || failed;
+  out->stream = NULL;
+  if (!failed) return pb_outfile_commit(out, err);
+  // An earlier write may be what failed: its reason is gone.
+  pb_status status = errno ? fail_errno(err, out->path, "cannot be written")
+                           : pb_fail(err, PB_ERR_IO, out->path, "cannot be written");
+  pb_outfile_discard(out);
+  return status;
+}
+
 pb_status pb_outfile_probe(const char *path, pb_error *err) {
   pb_outfile file;
   pb_status status = path ? pb_outfile_create(path, &file, err) : PB_OK;
@@ -71,6 +94,7 @@ pb_status pb_outfile_commit(pb_outfile *out, pb_error *err) {
 }
 
 void pb_outfile_discard(pb_outfile *out) {
+  if (out->stream) fclose(out->stream);
   if (out->temp && !out->direct) unlink(out->temp);
   free(out->path);
   free(out->temp);

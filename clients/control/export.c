@@ -1,8 +1,4 @@
 // Controllers for the daemon: bodies of its host_controller requests (docs/bus.md).
-#include <errno.h>
-#include <stdlib.h>
-#include <string.h>
-
 #include "control_tool.h"
 #include "outfile.h"
 
@@ -64,17 +60,11 @@ static pb_status write_file(const char *dir, const char *name, const iff_result 
   char path[1024];
   pb_outfile file = {0};
   pb_status status = pb_output_path(dir, name, path, sizeof path, err);
-  if (status == PB_OK) status = pb_outfile_create(path, &file, err);
+  if (status == PB_OK) status = pb_outfile_open(path, &file, err);
   if (status != PB_OK) return status;
-  FILE *stream = fopen(file.temp, "w");
-  if (stream && design) control_write_hac(stream, design);
-  if (stream && iff) control_write_iff(stream, iff);
-  bool failed = !stream || ferror(stream);
-  if (stream && fclose(stream)) failed = true;
-  if (!failed) return pb_outfile_commit(&file, err);
-  status = pb_fail(err, PB_ERR_IO, path, "cannot be written: %s", strerror(errno));
-  pb_outfile_discard(&file);
-  return status;
+  if (design) control_write_hac(file.stream, design);
+  if (iff) control_write_iff(file.stream, iff);
+  return pb_outfile_close(&file, err);
 }
 
 pb_status control_export(const iff_result *iff, const control_design *design, const char *dir,

@@ -38,22 +38,13 @@ int emit_done(const tool *t, pb_status status, const pb_error *err) {
 static pb_status write_json_file(const tool *t, json_function *write, const void *context,
                                  pb_error *err) {
   pb_outfile file;
-  pb_status status = pb_outfile_create(t->out, &file, err);
+  pb_jsonout json;
+  pb_status status = pb_outfile_open(t->out, &file, err);
   if (status) return status;
-  FILE *stream = fopen(file.temp, "w");
-  bool written = stream != NULL;
-  if (stream) {
-    pb_jsonout json;
-    pb_jsonout_begin(&json, stream);
-    write(&json, context);
-    pb_jsonout_end(&json);
-    written = !ferror(stream);
-    written = fclose(stream) == 0 && written;
-  }
-  if (written) return pb_outfile_commit(&file, err);
-  status = pb_fail(err, PB_ERR_IO, t->out, "cannot be written: %s", strerror(errno));
-  pb_outfile_discard(&file);
-  return status;
+  pb_jsonout_begin(&json, file.stream);
+  write(&json, context);
+  pb_jsonout_end(&json);
+  return pb_outfile_close(&file, err);
 }
 
 int emit_json(const tool *t, json_function *write, const void *context) {

@@ -15,58 +15,37 @@
 enum { PATH = 4096 };
 
 // A file in the directory that appears when it is complete.
-typedef struct sink {
-  pb_outfile file;
-  FILE *stream;
-} sink;
-
-static pb_status sink_open(const char *directory, const char *name, sink *out, pb_error *err) {
+static pb_status open_in(const char *directory, const char *name, pb_outfile *out, pb_error *err) {
   char path[PATH];
-  *out = (sink){0};
   if (snprintf(path, sizeof path, "%s/%s", directory, name) >= PATH)
     return pb_fail(err, PB_ERR_IO, directory, "the name is too long");
-  pb_status st = pb_outfile_create(path, &out->file, err);
-  if (st) return st;
-  out->stream = fopen(out->file.temp, "w");
-  if (out->stream) return PB_OK;
-  st = pb_fail(err, PB_ERR_IO, path, "cannot be written: %s", strerror(errno));
-  pb_outfile_discard(&out->file);
-  return st;
-}
-
-static pb_status sink_close(sink *s, pb_error *err) {
-  bool failed = ferror(s->stream) != 0;
-  failed |= fclose(s->stream) != 0;
-  if (!failed) return pb_outfile_commit(&s->file, err);
-  pb_status st = pb_fail(err, PB_ERR_IO, s->file.path, "cannot be written");
-  pb_outfile_discard(&s->file);
-  return st;
+  return pb_outfile_open(path, out, err);
 }
 
 // Symmetric: the lower triangle is what the format stores.
 static pb_status write_matrix(const char *directory, const char *name, const pb_sparse *a,
                               pb_error *err) {
-  sink s;
-  pb_status st = sink_open(directory, name, &s, err);
+  pb_outfile s;
+  pb_status st = open_in(directory, name, &s, err);
   if (st) return st;
   fprintf(s.stream, "%%%%MatrixMarket matrix coordinate real symmetric\n%zu %zu %lld\n", a->n, a->n,
           (long long)a->start[a->n]);
   for (size_t j = 0; j < a->n; j++)
     for (int64_t at = a->start[j]; at < a->start[j + 1]; at++)
       fprintf(s.stream, "%zu %lld %.17g\n", j + 1, (long long)a->row[at] + 1, a->value[at]);
-  return sink_close(&s, err);
+  return pb_outfile_close(&s, err);
 }
 
 static pb_status write_nodes(const build *b, const char *directory, pb_error *err) {
-  sink s;
-  pb_status st = sink_open(directory, "nodes.csv", &s, err);
+  pb_outfile s;
+  pb_status st = open_in(directory, "nodes.csv", &s, err);
   if (st) return st;
   fprintf(s.stream, "node,x,y,z\n");
   for (size_t i = 0; i < b->mesh.nodes; i++) {
     const double *p = b->mesh.xyz + 3 * i;
     fprintf(s.stream, "%zu,%.17g,%.17g,%.17g\n", i + 1, p[0], p[1], p[2]);
   }
-  return sink_close(&s, err);
+  return pb_outfile_close(&s, err);
 }
 
 // For plantbus-part reduce.
@@ -102,8 +81,8 @@ static void deck_materials(const build *b, FILE *out) {
 
 static pb_status write_deck(const build *b, const char *directory, const char *name,
                             const char *step, pb_error *err) {
-  sink s;
-  pb_status st = sink_open(directory, name, &s, err);
+  pb_outfile s;
+  pb_status st = open_in(directory, name, &s, err);
   if (st) return st;
   fprintf(s.stream, "** %s, built from its dimensions; m, N, kg, s\n*NODE, NSET=ALL\n",
           b->part.name);
@@ -114,7 +93,7 @@ static pb_status write_deck(const build *b, const char *directory, const char *n
   deck_elements(b, s.stream);
   deck_materials(b, s.stream);
   fprintf(s.stream, "*STEP\n%s*END STEP\n", step);
-  return sink_close(&s, err);
+  return pb_outfile_close(&s, err);
 }
 
 pb_status build_full(const build *b, const char *directory, pb_error *err) {

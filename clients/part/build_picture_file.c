@@ -61,14 +61,9 @@ static void put_quoted(FILE *out, const char *text) {
 pb_status drawing_svg(const drawing *d, const char *path, pb_error *err) {
   pb_outfile file;
   frame f = frame_of(d);
-  pb_status st = pb_outfile_create(path, &file, err);
+  pb_status st = pb_outfile_open(path, &file, err);
   if (st) return st;
-  FILE *out = fopen(file.temp, "w");
-  if (!out) {
-    st = pb_fail(err, PB_ERR_IO, path, "cannot be written: %s", strerror(errno));
-    pb_outfile_discard(&file);
-    return st;
-  }
+  FILE *out = file.stream;
   fprintf(out,
           "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%d\" height=\"%d\">\n"
           "<rect width=\"100%%\" height=\"100%%\" fill=\"white\"/>\n"
@@ -84,12 +79,7 @@ pb_status drawing_svg(const drawing *d, const char *path, pb_error *err) {
     fprintf(out, "\"/>\n");
   }
   fprintf(out, "</g>\n</svg>\n");
-  bool failed = ferror(out) != 0;
-  failed |= fclose(out) != 0;
-  if (!failed) return pb_outfile_commit(&file, err);
-  st = pb_fail(err, PB_ERR_IO, path, "cannot be written");
-  pb_outfile_discard(&file);
-  return st;
+  return pb_outfile_close(&file, err);
 }
 
 pb_status drawing_png(const drawing *d, const char *path, pb_error *err) {

@@ -223,14 +223,9 @@ static void write_frame(const pb_fem *fem, const pb_fem_frame *frame, pb_jsonout
 pb_status pb_frames_write(const pb_fem *fem, const char *path, pb_error *err) {
   pb_outfile out;
   pb_jsonout json;
-  pb_status st = pb_outfile_create(path, &out, err);
+  pb_status st = pb_outfile_open(path, &out, err);
   if (st) return st;
-  FILE *f = fopen(out.temp, "w");
-  if (!f) {
-    pb_outfile_discard(&out);
-    return pb_fail(err, PB_ERR_IO, path, "cannot be written: %m");
-  }
-  pb_jsonout_begin(&json, f);
+  pb_jsonout_begin(&json, out.stream);
   pb_jsonout_object(&json, NULL);
   pb_jsonout_text(&json, "schema", schema);
   pb_jsonout_object(&json, "frames");
@@ -238,9 +233,5 @@ pb_status pb_frames_write(const pb_fem *fem, const char *path, pb_error *err) {
   pb_jsonout_object_end(&json);
   pb_jsonout_object_end(&json);
   pb_jsonout_end(&json);
-  bool failed = ferror(f) != 0;
-  failed |= fclose(f) != 0;
-  if (!failed) return pb_outfile_commit(&out, err);
-  pb_outfile_discard(&out);
-  return pb_fail(err, PB_ERR_IO, path, "cannot be written: is the disk full?");
+  return pb_outfile_close(&out, err);
 }

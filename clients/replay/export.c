@@ -1,5 +1,4 @@
 // export: samples as CSV and MAT, and the plant file.
-#include <errno.h>
 #include <string.h>
 
 #include "outfile.h"
@@ -16,16 +15,10 @@ static pb_status plant_write(const pb_recording *r, uint32_t revision, const cha
     fprintf(stderr, "%s: warning: there are %zu revisions; %s is revision %u\n",
             program_invocation_short_name, r->revisions, path, v->revision);
   pb_outfile file;
-  pb_status status = pb_outfile_create(path, &file, err);
+  pb_status status = pb_outfile_open(path, &file, err);
   if (status) return status;
-  FILE *stream = fopen(file.temp, "wb");
-  const size_t size = strlen(v->plant_text);
-  bool good = stream && fwrite(v->plant_text, 1, size, stream) == size;
-  if (stream && fclose(stream)) good = false;
-  if (good) return pb_outfile_commit(&file, err);
-  status = pb_fail(err, PB_ERR_IO, path, "cannot be written: %s", strerror(errno));
-  pb_outfile_discard(&file);
-  return status;
+  fputs(v->plant_text, file.stream);
+  return pb_outfile_close(&file, err);
 }
 
 pb_status command_export(const replay_options *o, const pb_recording *r, pb_error *err) {

@@ -246,6 +246,31 @@ static void test_mat_disk_full(void **state) {
   assert_int_equal(access(path_of("full.mat"), F_OK), -1);
 }
 
+// What cannot be gone back in is a copy: it fails as a file does, and a pipe gets the same bytes.
+static void test_mat_special(void **state) {
+  (void)state;
+  pb_matfile *mat;
+  pb_error err = {0};
+  assert_int_equal(pb_matfile_open("/dev/full", &mat, &err), PB_OK);
+  pb_matfile_scalar(mat, "x", 1);
+  assert_int_equal(pb_matfile_close(mat, &err), PB_ERR_IO);
+  assert_string_equal(err.where, "/dev/full");
+  assert_non_null(strstr(err.message, "No space left"));
+
+  char plain[512], command[1200];
+  snprintf(plain, sizeof plain, "%s", path_of("plain.mat"));
+  const char *pipe_path = path_of("pipe.mat");
+  write_example(plain);
+  snprintf(command, sizeof command, "cmp -s '%s' '%s'", pipe_path, plain);
+  assert_int_equal(mkfifo(pipe_path, 0600), 0);
+  FILE *reader = popen(command, "w");
+  assert_non_null(reader);
+  write_example(pipe_path);
+  assert_int_equal(pclose(reader), 0);
+  unlink(pipe_path);
+  unlink(plain);
+}
+
 // ---- JSON ---------------------------------------------------------------------------------------
 
 static void test_json(void **state) {
@@ -303,7 +328,8 @@ int main(void) {
       cmocka_unit_test(test_csv),          cmocka_unit_test(test_csv_failures),
       cmocka_unit_test(test_mat),          cmocka_unit_test(test_mat_reproducible),
       cmocka_unit_test(test_mat_failures), cmocka_unit_test(test_mat_disk_full),
-      cmocka_unit_test(test_json),         cmocka_unit_test(test_json_format),
+      cmocka_unit_test(test_mat_special),  cmocka_unit_test(test_json),
+      cmocka_unit_test(test_json_format),
   };
   return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
