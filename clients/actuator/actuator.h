@@ -30,6 +30,21 @@ typedef struct live_options {
 extern const struct argp live_argp;  // argp child; its input is a live_options
 void live_defaults(live_options *options);
 
+// ---- what a command looks at: FILE or --live, and where its results go (subject.c) --------------
+
+typedef struct subject_options {
+  source_options source;
+  live_options live;
+  pb_result_options result;
+  bool other;          // set by the command: an option of its own says what to look at
+  const char *wanted;  // told where there is not one of them
+} subject_options;
+
+extern const struct argp subject_argp;  // argp child; its input is a subject_options
+void subject_defaults(subject_options *options);
+
+// ---- what an experiment gives -------------------------------------------------------------------
+
 // What an identification of a bench gives.
 typedef struct live_result {
   pb_apa_data data;   // y/V_a, V_s/V_a

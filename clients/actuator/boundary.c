@@ -22,11 +22,11 @@ static const struct argp_option option_table[] = {
     {"capacitance", KEY_CAPACITANCE, "F", 0,
      "Of the free sensor stack (default: of the model's boundary, else 4.4e-6)", 2},
     {"resistance", KEY_RESISTANCE, "OHMS", 0,
-     "Resistors, comma-separated (default: from 1/30 to 30 times 1/(ω C), ω of the resonance)", 2},
-    {"range", KEY_BAND, "F1,F2", 0,
-     "Of the responses, Hz (default: a third to three times the "
-     "resonance)",
+     "Resistors, comma-separated (default: from 1/30 to 30 times 1/(ω C), ω of the resonance; with "
+     "--live none)",
      2},
+    {"range", KEY_BAND, "F1,F2", 0,
+     "Of the responses, Hz (default: a third to three times the resonance; not with --live)", 2},
     {0},
 };
 
@@ -48,9 +48,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
   boundary_options *o = state->input;
   switch (key) {
   case ARGP_KEY_INIT:
-    state->child_inputs[0] = &o->result;
-    state->child_inputs[1] = &o->source;
-    state->child_inputs[2] = &o->live;
+    state->child_inputs[0] = &o->subject;
     return 0;
   case KEY_LOAD:
     o->load = pb_option_double(state, "--load", text, 1e-9, 1e9);
@@ -65,15 +63,12 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     parse_resistance(state, text, o);
     return 0;
   case KEY_BAND:
-    source_option_range(state, "--range", text, &o->f1, &o->f2);
-    return 0;
-  case ARGP_KEY_ARG:
-    source_take_file(&o->source, text, state);
+    pb_option_band(state, "--range", text, &o->f1, &o->f2);
     return 0;
   case ARGP_KEY_END:
-    if (!o->source.file && !o->live.live)
-      argp_error(state, "which actuator? Give an element (.mat), a plant file, or --live");
-    if (o->source.file && o->live.live) argp_error(state, "--live takes no file");
+    if (o->subject.live.live && (o->load > 0 || o->f2 > 0))
+      argp_error(state, "--load and --range do not go with --live");
+    if (!(o->load > 0)) o->load = 5;
     return 0;
   default:
     return ARGP_ERR_UNKNOWN;
@@ -196,7 +191,7 @@ static pb_status from_file(boundary_options *o, boundary_result *r, pb_error *er
   pb_element_source source;
   double resonance = 0;
   pb_progress progress;
-  pb_status st = source_open(&o->source, &source, err);
+  pb_status st = source_open(&o->subject.source, &source, err);
   if (st) return st;
   pb_boundary b = boundary_start(o, source.model);
   snprintf(r->subject, sizeof r->subject, "%.100s with %g kg", source.name, o->load);
@@ -216,10 +211,7 @@ static pb_status from_file(boundary_options *o, boundary_result *r, pb_error *er
 }
 
 int command_boundary(int argc, char **argv) {
-  static const struct argp_child children[] = {{&result_argp, 0, NULL, 0},
-                                               {&source_argp, 0, NULL, 0},
-                                               {&live_argp, 0, "On a running plant:", 8},
-                                               {0}};
+  static const struct argp_child children[] = {{&subject_argp, 0, NULL, 0}, {0}};
   static const struct argp argp = {
       option_table,
       parse,
@@ -232,18 +224,17 @@ int command_boundary(int argc, char **argv) {
       children,
       NULL,
       NULL};
-  boundary_options o = {.load = 5};
+  boundary_options o = {0};
   boundary_result r = {0};
   pb_error err = {0};
-  source_defaults(&o.source);
-  live_defaults(&o.live);
+  subject_defaults(&o.subject);
   pb_options_parse(&argp, argc, argv, &o);
   pb_interrupt_install();
-  pb_status st = o.live.live ? boundary_live(&o, &r, &err) : from_file(&o, &r, &err);
+  pb_status st = o.subject.live.live ? boundary_live(&o, &r, &err) : from_file(&o, &r, &err);
   if (!st) st = boundary_present(&o, &r, &err);
   for (size_t i = 0; i < r.count; i++) free(r.row[i].response);
   free(r.row);
   free(r.hz);
   free(o.resistance);
-  return result_end(st, &err);
+  return pb_result_end(st, &err);
 }

@@ -6,9 +6,7 @@
 #include "plant/plant.h"
 
 typedef struct boundary_options {
-  source_options source;
-  result_options result;
-  live_options live;
+  subject_options subject;
   double load;                   // kg
   double coupling, capacitance;  // 0: of the model, else the defaults
   double *resistance;            // Ohm [resistances]; NULL: around the best

@@ -14,8 +14,8 @@ static const double patience = 60;  // seconds for a model to be compiled and sw
 // Sends a request that makes a revision and waits until it acts.
 static pb_status reconfigure(const boundary_options *o, const char *kind, const cJSON *body,
                              pb_error *err) {
-  const pb_session_options options = {.domain = o->live.common.domain,
-                                      .plant = o->live.common.plant};
+  const pb_session_options options = {.domain = o->subject.live.common.domain,
+                                      .plant = o->subject.live.common.plant};
   pb_session *session = NULL;
   pb_session_event event;
   pb_answer answer = {0};
@@ -67,15 +67,15 @@ static pb_status put_back(const boundary_options *o, uint32_t revision, pb_error
 // What is served: the actuator's model, its revision.
 static pb_status find_model(const boundary_options *o, pb_element_source *source,
                             uint32_t *revision, boundary_result *r, pb_error *err) {
-  const pb_session_options options = {.domain = o->live.common.domain,
-                                      .plant = o->live.common.plant};
+  const pb_session_options options = {.domain = o->subject.live.common.domain,
+                                      .plant = o->subject.live.common.plant};
   pb_session *session = NULL;
   pb_status st = pb_session_open(&options, &session, err);
   if (st) return st;
   const pb_description *d = pb_session_description(session);
   *revision = d->revision;
   snprintf(r->subject, sizeof r->subject, "%.100s, measured", d->name);
-  st = pb_element_source_plant(d->plant_text, d->name, NULL, o->source.model,
+  st = pb_element_source_plant(d->plant_text, d->name, NULL, o->subject.source.model,
                                pb_element_is_actuator, source, err);
   pb_session_close(session);
   return st;
@@ -86,7 +86,7 @@ static pb_status measure(const boundary_options *o, const char *model, const pb_
   live_result live;
   pb_apa_landmarks l;
   pb_status st = switch_to(o, model, b, err);
-  if (!st) st = live_identify(&o->live, false, &live, err);
+  if (!st) st = live_identify(&o->subject.live, false, &live, err);
   if (st) return st;
   st = pb_apa_landmarks_of_data(&live.data, &l, err);
   const boundary_row row = {.boundary = *b,

@@ -149,7 +149,7 @@ static pb_status plot_responses(const boundary_options *o, const boundary_result
                              .unit = "m/V",
                              .count = count,
                              .curve = curve};
-  pb_status st = result_path(&o->result, "boundary.png", path, sizeof path, err);
+  pb_status st = pb_result_path(&o->subject.result, "boundary.png", path, sizeof path, err);
   return st ? st : pb_plot_bode(path, &bode, err);
 }
 
@@ -175,7 +175,7 @@ static pb_status plot_resistors(const boundary_options *o, const boundary_result
          .count = 1,
          .curve = lower}};
     const pb_plot_figure figure = {.shared_x = true, .count = 2, .panel = panel};
-    st = result_path(&o->result, "boundary-resistance.png", path, sizeof path, err);
+    st = pb_result_path(&o->subject.result, "boundary-resistance.png", path, sizeof path, err);
     if (!st) st = pb_plot(path, &figure, err);
   }
   free(ohms);
@@ -187,17 +187,17 @@ static pb_status plot_resistors(const boundary_options *o, const boundary_result
 pb_status boundary_present(const boundary_options *o, const boundary_result *r, pb_error *err) {
   char path[1024];
   pb_status st = PB_OK;
-  if (o->result.json)
+  if (o->subject.result.json)
     print_json(r);
   else
     st = print(r, err);
-  if (!st && o->result.dir) {
-    st = result_path(&o->result, "boundary.csv", path, sizeof path, err);
+  if (!st && o->subject.result.dir) {
+    st = pb_result_path(&o->subject.result, "boundary.csv", path, sizeof path, err);
     if (!st) st = save_csv(r, path, err);
-    if (!st) st = result_path(&o->result, "boundary.mat", path, sizeof path, err);
+    if (!st) st = pb_result_path(&o->subject.result, "boundary.mat", path, sizeof path, err);
     if (!st) st = save_mat(r, path, err);
   }
-  if (!st && o->result.plot && r->hz) st = plot_responses(o, r, err);
-  if (!st && o->result.plot && r->count > 3) st = plot_resistors(o, r, err);
+  if (!st && o->subject.result.plot && r->hz) st = plot_responses(o, r, err);
+  if (!st && o->subject.result.plot && r->count > 3) st = plot_resistors(o, r, err);
   return st;
 }

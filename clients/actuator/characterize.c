@@ -25,9 +25,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
   characterize_options *o = state->input;
   switch (key) {
   case ARGP_KEY_INIT:
-    state->child_inputs[0] = &o->result;
-    state->child_inputs[1] = &o->source;
-    state->child_inputs[2] = &o->live;
+    state->child_inputs[0] = &o->subject;
     return 0;
   case KEY_SHEET:
     o->datasheet = text;
@@ -45,15 +43,11 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     o->load = pb_option_double(state, "--load", text, 1e-9, 1e9);
     return 0;
   case KEY_BAND:
-    source_option_range(state, "--range", text, &o->f1, &o->f2);
-    return 0;
-  case ARGP_KEY_ARG:
-    source_take_file(&o->source, text, state);
+    pb_option_band(state, "--range", text, &o->f1, &o->f2);
     return 0;
   case ARGP_KEY_END:
-    if (!o->source.file && !o->live.live)
-      argp_error(state, "which actuator? Give an element (.mat), a plant file, or --live");
-    if (o->source.file && o->live.live) argp_error(state, "--live takes no file");
+    if (o->subject.live.live && o->subject.result.plot)
+      argp_error(state, "--plot: the responses of an experiment are drawn by plantbus-identify");
     return 0;
   default:
     return ARGP_ERR_UNKNOWN;
@@ -85,8 +79,7 @@ static pb_status put_sheet(const characterize_options *o, characterize_result *r
   r->sheet_stiffness = NAN;
   if (!o->datasheet) return PB_OK;
   split_sheet(o->datasheet, path, sizeof path, &name);
-  pb_status st = pb_shipped_read(path[0] ? path : NULL, pb_shipped_actuators, &file, err);
-  if (!st) st = pb_sheets_check(file, actuator_quantities, &sheets, err);
+  pb_status st = pb_shipped_sheets(path[0] ? path : NULL, actuator_quantities, &file, &sheets, err);
   if (!st && !name && cJSON_GetArraySize(sheets) == 1) name = sheets->child->string;
   if (!st && name) sheet = pb_json_member(sheets, name);
   if (!st && !sheet)
@@ -131,7 +124,7 @@ static pb_status from_file(const characterize_options *o, characterize_result *r
   pb_actuator_character character;
   pb_bench_model bench = {0};
   pb_warnings warnings = {0};
-  pb_status st = source_open(&o->source, &source, err);
+  pb_status st = source_open(&o->subject.source, &source, err);
   if (st) return st;
   snprintf(r->name, sizeof r->name, "%s", source.name);
   st = pb_actuator_characterize(&source, &o->nominal, &warnings, &bench, &character, err);
@@ -150,10 +143,7 @@ static pb_status from_file(const characterize_options *o, characterize_result *r
 }
 
 int command_characterize(int argc, char **argv) {
-  static const struct argp_child children[] = {{&result_argp, 0, NULL, 0},
-                                               {&source_argp, 0, NULL, 0},
-                                               {&live_argp, 0, "On a running plant:", 8},
-                                               {0}};
+  static const struct argp_child children[] = {{&subject_argp, 0, NULL, 0}, {0}};
   static const struct argp argp = {
       option_table,
       parse,
@@ -174,13 +164,12 @@ int command_characterize(int argc, char **argv) {
       .nominal = {.stroke = 20e-6, .length = 0.02}, .load = 5.056, .f1 = 10, .f2 = 1e4};
   characterize_result r = {0};
   pb_error err = {0};
-  source_defaults(&o.source);
-  live_defaults(&o.live);
+  subject_defaults(&o.subject);
   pb_options_parse(&argp, argc, argv, &o);
-  pb_status st = o.live.live ? characterize_live(&o, &r, &err) : from_file(&o, &r, &err);
+  pb_status st = o.subject.live.live ? characterize_live(&o, &r, &err) : from_file(&o, &r, &err);
   if (!st) st = put_sheet(&o, &r, &err);
   if (!st) st = characterize_present(&o, &r, &err);
   free(r.hz);
   free(r.compliance);
-  return result_end(st, &err);
+  return pb_result_end(st, &err);
 }

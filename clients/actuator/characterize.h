@@ -7,9 +7,7 @@
 #include "study/actuator_character.h"
 
 typedef struct characterize_options {
-  source_options source;
-  result_options result;
-  live_options live;
+  subject_options subject;
   pb_stack_nominal nominal;
   const char *datasheet;  // NAME of the shipped list, FILE, or FILE:NAME; NULL: none
   double load;            // kg, on a live bench without a force input

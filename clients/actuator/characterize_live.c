@@ -12,7 +12,7 @@ static const double two_pi = 6.283185307179586476925286766559;
 pb_status characterize_live(const characterize_options *o, characterize_result *r, pb_error *err) {
   live_result live;
   pb_apa_landmarks l;
-  pb_status st = live_identify(&o->live, true, &live, err);
+  pb_status st = live_identify(&o->subject.live, true, &live, err);
   if (st) return st;
   st = pb_apa_landmarks_of_data(&live.data, &l, err);
   if (!st) {

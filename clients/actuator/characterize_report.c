@@ -8,7 +8,7 @@
 #include "plot.h"
 
 static pb_status print(const characterize_options *o, const characterize_result *r, pb_error *err) {
-  if (!o->result.json) {
+  if (!o->subject.result.json) {
     printf("%s\n\n", r->name);
     return figures_print(r->figure, r->figures, o->datasheet != NULL, err);
   }
@@ -36,11 +36,11 @@ static pb_status save(const characterize_options *o, const characterize_result *
   const response compliance = {"compliance", "m/N", r->compliance};
   char path[1024];
   pb_matfile *mat;
-  pb_status st = result_path(&o->result, "characterize.csv", path, sizeof path, err);
+  pb_status st = pb_result_path(&o->subject.result, "characterize.csv", path, sizeof path, err);
   if (!st)
     st = r->compliance ? responses_csv(path, r->hz, CHARACTERIZE_POINTS, &compliance, 1, err)
                        : figures_csv(r, path, err);
-  if (!st) st = result_path(&o->result, "characterize.mat", path, sizeof path, err);
+  if (!st) st = pb_result_path(&o->subject.result, "characterize.mat", path, sizeof path, err);
   if (!st) st = pb_matfile_open(path, &mat, err);
   if (st) return st;
   pb_matfile_text(mat, "name", r->name);
@@ -58,11 +58,8 @@ static double complex *level(double compliance) {
 
 static pb_status plot(const characterize_options *o, const characterize_result *r, pb_error *err) {
   char path[1024], label[3][160];
-  pb_status st = result_path(&o->result, "characterize.png", path, sizeof path, err);
+  pb_status st = pb_result_path(&o->subject.result, "characterize.png", path, sizeof path, err);
   if (st) return st;
-  if (!r->compliance)
-    return pb_fail(err, PB_ERR_ARGUMENT, "--plot",
-                   "an experiment's responses are drawn by plantbus-identify");
   const bool sheet = !isnan(r->sheet_stiffness);
   double complex *own = level(1 / r->stiffness), *data = level(1 / r->sheet_stiffness);
   if (own && data) {
@@ -90,7 +87,7 @@ static pb_status plot(const characterize_options *o, const characterize_result *
 pb_status characterize_present(const characterize_options *o, const characterize_result *r,
                                pb_error *err) {
   pb_status st = print(o, r, err);
-  if (!st && o->result.dir) st = save(o, r, err);
-  if (!st && o->result.plot) st = plot(o, r, err);
+  if (!st && o->subject.result.dir) st = save(o, r, err);
+  if (!st && o->subject.result.plot) st = plot(o, r, err);
   return st;
 }

@@ -10,7 +10,7 @@ enum { KEY_D33 = 0x100, KEY_EPS, KEY_S_D, KEY_C_E, KEY_LENGTH, KEY_AREA, KEY_LAY
 
 typedef struct options {
   pb_piezo piezo;
-  result_options result;
+  pb_result_options result;
 } options;
 
 static const struct argp_option option_table[] = {
@@ -95,9 +95,9 @@ static pb_status save_csv(const char *path, const part_figure *f, pb_error *err)
 static pb_status save(const options *o, const part_figure *f, pb_error *err) {
   char path[1024];
   pb_matfile *mat;
-  pb_status st = result_path(&o->result, "constants.csv", path, sizeof path, err);
+  pb_status st = pb_result_path(&o->result, "constants.csv", path, sizeof path, err);
   if (!st) st = save_csv(path, f, err);
-  if (!st) st = result_path(&o->result, "constants.mat", path, sizeof path, err);
+  if (!st) st = pb_result_path(&o->result, "constants.mat", path, sizeof path, err);
   if (!st) st = pb_matfile_open(path, &mat, err);
   if (st) return st;
   figures_mat(mat, f, FIGURES);
@@ -128,12 +128,12 @@ static pb_status plot(const options *o, pb_error *err) {
        .count = 2,
        .curve = sensor}};
   const pb_plot_figure figure = {.shared_x = true, .count = 2, .panel = panel};
-  pb_status st = result_path(&o->result, "constants.png", path, sizeof path, err);
+  pb_status st = pb_result_path(&o->result, "constants.png", path, sizeof path, err);
   return st ? st : pb_plot(path, &figure, err);
 }
 
 int command_constants(int argc, char **argv) {
-  static const struct argp_child children[] = {{&result_argp, 0, NULL, 0}, {0}};
+  static const struct argp_child children[] = {{&pb_result_argp, 0, NULL, 0}, {0}};
   static const struct argp argp = {
       option_table,
       parse,
@@ -161,5 +161,5 @@ int command_constants(int argc, char **argv) {
   }
   if (!st && o.result.dir) st = save(&o, f, &err);
   if (!st && o.result.plot) st = plot(&o, &err);
-  return result_end(st, &err);
+  return pb_result_end(st, &err);
 }

@@ -48,12 +48,6 @@ static const struct argp_option option_table[] = {
     {0},
 };
 
-static void check_end(const fit_options *o, struct argp_state *state) {
-  const int given = (o->source.file != NULL) + (o->frf != NULL) + o->live.live;
-  if (given != 1) argp_error(state, "tune to one of: a FILE, --frf FILE, --live");
-  if (o->free_ratio && !(o->refine2 > 0)) argp_error(state, "--free-ratio goes with --refine");
-}
-
 static error_t parse_model(int key, char *text, struct argp_state *state, fit_options *o) {
   switch (key) {
   case KEY_WRITE:
@@ -78,12 +72,11 @@ static error_t parse(int key, char *text, struct argp_state *state) {
   fit_options *o = state->input;
   switch (key) {
   case ARGP_KEY_INIT:
-    state->child_inputs[0] = &o->result;
-    state->child_inputs[1] = &o->source;
-    state->child_inputs[2] = &o->live;
+    state->child_inputs[0] = &o->subject;
     return 0;
   case KEY_FRF:
     o->frf = text;
+    o->subject.other = true;
     return 0;
   case KEY_RATE:
     o->sample_rate = pb_option_double(state, "--sample-rate", text, 1e-3, 1e9);
@@ -101,19 +94,16 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     o->ratio = pb_option_double(state, "--ratio", text, 1e-6, 1e6);
     return 0;
   case KEY_BAND:
-    source_option_range(state, "--range", text, &o->f1, &o->f2);
+    pb_option_band(state, "--range", text, &o->f1, &o->f2);
     return 0;
   case KEY_REFINE:
-    source_option_range(state, "--refine", text, &o->refine1, &o->refine2);
+    pb_option_band(state, "--refine", text, &o->refine1, &o->refine2);
     return 0;
   case KEY_FREE:
     o->free_ratio = true;
     return 0;
-  case ARGP_KEY_ARG:
-    source_take_file(&o->source, text, state);
-    return 0;
   case ARGP_KEY_END:
-    check_end(o, state);
+    if (o->free_ratio && !(o->refine2 > 0)) argp_error(state, "--free-ratio goes with --refine");
     return 0;
   default:
     return parse_model(key, text, state, o);
@@ -148,7 +138,7 @@ static pb_status from_file(const fit_options *o, fit_result *r, pb_error *err) {
   pb_bench_model bench = {0};
   pb_warnings warnings = {0};
   double *hz = log_frequencies(o->f1, o->f2, POINTS);
-  pb_status st = hz ? source_open(&o->source, &source, err) : pb_fail_memory(err, "fit");
+  pb_status st = hz ? source_open(&o->subject.source, &source, err) : pb_fail_memory(err, "fit");
   if (st) {
     free(hz);
     return st;
@@ -171,7 +161,7 @@ static pb_status from_file(const fit_options *o, fit_result *r, pb_error *err) {
 }
 
 static pb_status from_measurement(const fit_options *o, fit_result *r, pb_error *err) {
-  const frf_names names = {o->live.va, {o->live.y, o->live.vs}};
+  const frf_names names = {o->subject.live.va, {o->subject.live.y, o->subject.live.vs}};
   live_result live;
   pb_status st = PB_OK;
   if (o->frf) {
@@ -180,7 +170,7 @@ static pb_status from_measurement(const fit_options *o, fit_result *r, pb_error 
       r->data.sample_rate = o->sample_rate > 0 ? o->sample_rate : 10000;
     snprintf(r->subject, sizeof r->subject, "%.150s", o->frf);
   } else {
-    st = live_identify(&o->live, false, &live, err);
+    st = live_identify(&o->subject.live, false, &live, err);
     if (st) return st;
     r->data = live.data;
     snprintf(r->subject, sizeof r->subject, "%s, measured at revision %u", live.plant,
@@ -196,7 +186,7 @@ static void fill_defaults(const fit_options *o, fit_result *r) {
   if (o->name) snprintf(r->name, sizeof r->name, "%s", o->name);
   if (o->mass > 0) r->mass = o->mass;
   if (!(r->mass > 0)) r->mass = 0.112;
-  if (o->source.length > 0) r->length = o->source.length;
+  if (o->subject.source.length > 0) r->length = o->subject.source.length;
   if (!(r->length > 0)) r->length = 0.03;
   if (o->radius > 0) r->radius = o->radius;
   if (!(r->radius > 0)) r->radius = 0.02;
@@ -219,10 +209,7 @@ static pb_status tune(const fit_options *o, fit_result *r, pb_error *err) {
 }
 
 int command_fit(int argc, char **argv) {
-  static const struct argp_child children[] = {{&result_argp, 0, NULL, 0},
-                                               {&source_argp, 0, NULL, 0},
-                                               {&live_argp, 0, "On a running plant:", 8},
-                                               {0}};
+  static const struct argp_child children[] = {{&subject_argp, 0, NULL, 0}, {0}};
   static const struct argp argp = {
       option_table,
       parse,
@@ -241,15 +228,15 @@ int command_fit(int argc, char **argv) {
   fit_options o = {.load = 5, .inner = 1e-3, .ratio = 2, .f1 = 1, .f2 = 20000, .tolerance = 0.2};
   fit_result r = {0};
   pb_error err = {0};
-  source_defaults(&o.source);
-  live_defaults(&o.live);
+  subject_defaults(&o.subject);
+  o.subject.wanted = "tune to one of: a FILE, --frf FILE, --live";
   pb_options_parse(&argp, argc, argv, &o);
-  pb_status st = o.source.file ? from_file(&o, &r, &err) : from_measurement(&o, &r, &err);
+  pb_status st = o.subject.source.file ? from_file(&o, &r, &err) : from_measurement(&o, &r, &err);
   fill_defaults(&o, &r);
   if (!st) st = tune(&o, &r, &err);
   if (!st) st = fit_present(&o, &r, &err);
   pb_apa_data_clear(&r.data);
   pb_apa_match_clear(&r.match);
   free(r.model);
-  return result_end(st, &err);
+  return pb_result_end(st, &err);
 }

@@ -5,9 +5,7 @@
 #include "actuator.h"
 
 typedef struct fit_options {
-  source_options source;
-  result_options result;
-  live_options live;
+  subject_options subject;
   const char *frf;          // file of plantbus-identify
   const char *write;        // file of the model
   const char *name;         // of the model; NULL: of what it is tuned to, and "-2dof"

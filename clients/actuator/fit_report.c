@@ -191,9 +191,9 @@ static pb_status save(const fit_options *o, const fit_result *r, const response 
   const pb_frf *frf = &r->data.frf;
   char path[1024];
   pb_matfile *mat;
-  pb_status st = result_path(&o->result, "fit.csv", path, sizeof path, err);
+  pb_status st = pb_result_path(&o->subject.result, "fit.csv", path, sizeof path, err);
   if (!st) st = responses_csv(path, frf->frequency_hz, frf->nf, list, 4, err);
-  if (!st) st = result_path(&o->result, "fit.mat", path, sizeof path, err);
+  if (!st) st = pb_result_path(&o->subject.result, "fit.mat", path, sizeof path, err);
   if (!st) st = pb_matfile_open(path, &mat, err);
   if (st) return st;
   responses_mat(mat, frf->frequency_hz, frf->nf, list, 4);
@@ -220,7 +220,7 @@ static pb_status plot(const fit_options *o, const fit_result *r, const response 
          list[2 * k + 1].h, NULL},
     };
     const pb_bode_plot bode = {.title = title, .unit = output_units[k], .count = 2, .curve = curve};
-    st = result_path(&o->result, file, path, sizeof path, err);
+    st = pb_result_path(&o->subject.result, file, path, sizeof path, err);
     if (!st) st = pb_plot_bode(path, &bode, err);
   }
   return st;
@@ -231,7 +231,7 @@ pb_status fit_present(const fit_options *o, const fit_result *r, pb_error *err) 
   static const char *const names[4] = {"y", "y model", "Vs", "Vs model"};
   response list[4];
   pb_status st = PB_OK;
-  if (o->result.json)
+  if (o->subject.result.json)
     print_json(r);
   else
     st = print(o, r, err);
@@ -240,8 +240,8 @@ pb_status fit_present(const fit_options *o, const fit_result *r, pb_error *err) 
     list[i] = (response){names[i], output_units[i / 2], h[i]};
     if (!h[i]) st = pb_fail_memory(err, "fit");
   }
-  if (!st && o->result.dir) st = save(o, r, list, err);
-  if (!st && o->result.plot) st = plot(o, r, list, err);
+  if (!st && o->subject.result.dir) st = save(o, r, list, err);
+  if (!st && o->subject.result.plot) st = plot(o, r, list, err);
   if (!st && o->write) st = write_model(r, o->write, err);
   for (int i = 0; i < 4; i++) free(h[i]);
   return st;

@@ -66,9 +66,6 @@ static pb_status choose_experiment(const live_options *o, const pb_bench *bench,
   const double rate = bench->model->sample_rate;
   pb_pole_list poles;
   *e = o->excite.experiment;
-  if (e->excitation == PB_EXCITE_NOISE)
-    return pb_fail(err, PB_ERR_ARGUMENT, "--excitation",
-                   "noise leaks around a sharp zero: take multisine, periodic-noise or chirp");
   if (e->rms == 0) e->rms = 1;
   if (e->f2 == 0) e->f1 = 1, e->f2 = fmin(1000, 0.4 * rate);
   if (e->resolution == 0) e->resolution = 0.5;

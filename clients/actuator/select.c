@@ -89,7 +89,7 @@ static pb_status judge(const select_options *o, const cJSON *sheets, select_resu
 }
 
 int command_select(int argc, char **argv) {
-  static const struct argp_child children[] = {{&result_argp, 0, NULL, 0}, {0}};
+  static const struct argp_child children[] = {{&pb_result_argp, 0, NULL, 0}, {0}};
   static const struct argp argp = {
       option_table,
       parse,
@@ -108,11 +108,10 @@ int command_select(int argc, char **argv) {
   pb_options_parse(&argp, argc, argv, &o);
   pb_status st = pb_shipped_limits(o.specification, pb_shipped_actuator_specification,
                                    actuator_quantities, &j.limits, &err);
-  if (!st) st = pb_shipped_read(o.list, pb_shipped_actuators, &file, &err);
-  if (!st) st = pb_sheets_check(file, actuator_quantities, &sheets, &err);
+  if (!st) st = pb_shipped_sheets(o.list, actuator_quantities, &file, &sheets, &err);
   if (!st) st = judge(&o, sheets, &j, &err);
   if (!st) st = select_present(&o, &j, &err);
-  int code = result_end(st, &err);
+  int code = pb_result_end(st, &err);
   if (code == PB_EXIT_DONE && j.meeting == 0) code = PB_EXIT_FAILED;
   pb_limits_clear(&j.limits);
   free(j.candidate);

@@ -9,7 +9,7 @@ typedef struct select_options {
   const char *list, *specification;
   double near;
   bool strict;
-  result_options result;
+  pb_result_options result;
 } select_options;
 
 typedef struct select_entry {

@@ -193,13 +193,13 @@ pb_status select_present(const select_options *o, const select_result *j, pb_err
   else
     st = print(j, err);
   if (!st && o->result.dir) {
-    st = result_path(&o->result, "select.csv", path, sizeof path, err);
+    st = pb_result_path(&o->result, "select.csv", path, sizeof path, err);
     if (!st) st = save_csv(j, path, err);
-    if (!st) st = result_path(&o->result, "select.mat", path, sizeof path, err);
+    if (!st) st = pb_result_path(&o->result, "select.mat", path, sizeof path, err);
     if (!st) st = save_mat(j, path, err);
   }
   if (!st && o->result.plot) {
-    st = result_path(&o->result, "select.png", path, sizeof path, err);
+    st = pb_result_path(&o->result, "select.png", path, sizeof path, err);
     if (!st) st = plot(j, path, err);
   }
   return st;

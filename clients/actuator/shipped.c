@@ -64,8 +64,8 @@ static pb_status check_sheet(const cJSON *sheet, const char *where, const char *
   return PB_OK;
 }
 
-pb_status pb_sheets_check(const cJSON *file, const char *const *known, const cJSON **sheets,
-                          pb_error *err) {
+static pb_status check_sheets(const cJSON *file, const char *const *known, const cJSON **sheets,
+                              pb_error *err) {
   const cJSON *schema = pb_json_member(file, "schema");
   if (!cJSON_IsString(schema) || strcmp(schema->valuestring, "plantbus.actuators/1"))
     return pb_fail(err, PB_ERR_SCHEMA, "/schema", "expected \"plantbus.actuators/1\"");
@@ -79,4 +79,10 @@ pb_status pb_sheets_check(const cJSON *file, const char *const *known, const cJS
     if (st) return st;
   }
   return PB_OK;
+}
+
+pb_status pb_shipped_sheets(const char *path, const char *const *known, cJSON **file,
+                            const cJSON **sheets, pb_error *err) {
+  pb_status st = pb_shipped_read(path, pb_shipped_actuators, file, err);
+  return st ? st : name_file(path, check_sheets(*file, known, sheets, err), err);
 }

@@ -28,9 +28,10 @@ typedef struct pb_sheet_value {
 pb_status pb_sheet_read(const cJSON *sheet, const char *where, const char *key, pb_sheet_value *out,
                         pb_error *err);
 
-// The data sheets {name: {quantity: value}} of a file, whose schema, names and quantities are
-// checked. *sheets points into file. [init]
-pb_status pb_sheets_check(const cJSON *file, const char *const *known, const cJSON **sheets,
-                          pb_error *err);
+// The data sheets {name: {quantity: value}} of a file, or with path NULL the shipped ones; schema,
+// names and quantities are checked. *file is the caller's (cJSON_Delete), *sheets points into it.
+// Fails as pb_shipped_read, and with PB_ERR_SCHEMA. [init]
+pb_status pb_shipped_sheets(const char *path, const char *const *known, cJSON **file,
+                            const cJSON **sheets, pb_error *err);
 
 #endif

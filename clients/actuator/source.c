@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "base/text.h"
-#include "frf_files.h"
 
 enum {
   KEY_MODEL = 0x500,
@@ -19,8 +18,6 @@ enum {
   KEY_G_S,
   KEY_DAMPING,
   KEY_PART_LENGTH,
-  KEY_JSON,
-  KEY_PLOT,
 };
 
 // ---- the part -----------------------------------------------------------------------------------
@@ -43,44 +40,6 @@ static const struct argp_option source_table[] = {
     {0},
 };
 
-void source_option_range(const struct argp_state *state, const char *flag, const char *text,
-                         double *f1, double *f2) {
-  double *value = NULL;
-  size_t count = 0;
-  pb_option_double_list(state, flag, text, &value, &count);
-  if (count == 2 && value[0] > 0 && value[1] > value[0])
-    *f1 = value[0], *f2 = value[1];
-  else
-    argp_error(state, "%s: '%s' is not two frequencies 0 < F1 < F2", flag, text);
-  free(value);
-}
-
-void source_option_frames(const struct argp_state *state, const char *flag, const char *text,
-                          size_t frames[2]) {
-  double *value = NULL;
-  size_t count = 0;
-  pb_option_double_list(state, flag, text, &value, &count);
-  bool ok = count == 2 && value[0] != value[1];
-  for (size_t i = 0; i < count && ok; i++) {
-    frames[i] = value[i] >= 1 && value[i] <= 1e6 ? (size_t)value[i] : 0;
-    ok = frames[i] > 0 && (double)frames[i] == value[i];
-  }
-  if (!ok) argp_error(state, "%s: '%s' is not two different frames, counted from 1", flag, text);
-  free(value);
-}
-
-static void parse_axis(struct argp_state *state, const char *text, double out[3]) {
-  double *value = NULL, size = 0;
-  size_t count = 0;
-  pb_option_double_list(state, "--axis", text, &value, &count);
-  for (size_t i = 0; i < count; i++) size += value[i] * value[i];
-  if (count == 3 && size > 0)
-    memcpy(out, value, 3 * sizeof *out);
-  else
-    argp_error(state, "--axis: '%s' is not a direction X,Y,Z", text);
-  free(value);
-}
-
 static error_t source_parse(int key, char *text, struct argp_state *state) {
   source_options *o = state->input;
   pb_actuator_layout *l = o ? &o->layout : NULL;
@@ -94,16 +53,16 @@ static error_t source_parse(int key, char *text, struct argp_state *state) {
   }
   switch (key) {
   case KEY_ENDS:
-    source_option_frames(state, "--ends", text, l->ends);
+    pb_option_frames(state, "--ends", text, l->ends);
     break;
   case KEY_ACTUATOR:
-    source_option_frames(state, "--actuator-frames", text, l->actuator);
+    pb_option_frames(state, "--actuator-frames", text, l->actuator);
     break;
   case KEY_SENSOR:
-    source_option_frames(state, "--sensor-frames", text, l->sensor);
+    pb_option_frames(state, "--sensor-frames", text, l->sensor);
     break;
   case KEY_AXIS:
-    parse_axis(state, text, l->axis);
+    pb_option_direction(state, "--axis", text, l->axis);
     break;
   case KEY_POLARITY:
     l->polarity = pb_option_double(state, "--polarity", text, -1, 1);
@@ -130,11 +89,6 @@ const struct argp source_argp = {source_table, source_parse, NULL, NULL, NULL, N
 
 void source_defaults(source_options *o) {
   *o = (source_options){.layout = pb_actuator_layout_default()};
-}
-
-void source_take_file(source_options *o, const char *text, struct argp_state *state) {
-  if (o->file) argp_error(state, "unexpected argument '%s'", text);
-  o->file = text;
 }
 
 bool source_is_element_file(const char *path) {
@@ -191,43 +145,4 @@ pb_status source_open(const source_options *o, pb_element_source *out, pb_error 
   free(text);
   free(directory);
   return st;
-}
-
-// ---- results ------------------------------------------------------------------------------------
-
-static const struct argp_option result_table[] = {
-    {"json", KEY_JSON, NULL, 0, "Print JSON instead of tables", 1},
-    {"output-dir", 'o', "DIR", 0, "Write CSV and MAT files into DIR", 1},
-    {"plot", KEY_PLOT, NULL, 0, "Draw plots (PNG) into DIR, or here", 1},
-    {0},
-};
-
-static error_t result_parse(int key, char *text, struct argp_state *state) {
-  result_options *o = state->input;
-  switch (key) {
-  case KEY_JSON:
-    o->json = true;
-    return 0;
-  case 'o':
-    o->dir = text;
-    return 0;
-  case KEY_PLOT:
-    o->plot = true;
-    return 0;
-  default:
-    return ARGP_ERR_UNKNOWN;
-  }
-}
-
-const struct argp result_argp = {result_table, result_parse, NULL, NULL, NULL, NULL, NULL};
-
-pb_status result_path(const result_options *o, const char *name, char *text, size_t size,
-                      pb_error *err) {
-  return pb_output_path(o->dir ? o->dir : ".", name, text, size, err);
-}
-
-int result_end(pb_status status, const pb_error *err) {
-  if (status == PB_OK) return PB_EXIT_DONE;
-  pb_print_error(stderr, err);
-  return PB_EXIT_FAILED;
 }

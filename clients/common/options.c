@@ -122,6 +122,48 @@ void pb_option_names(const struct argp_state *state, const char *flag, const cha
   }
 }
 
+void pb_option_numbers(const struct argp_state *state, const char *flag, const char *text,
+                       double *out, size_t count, const char *expected) {
+  double *value = NULL;
+  size_t given = 0;
+  if (pb_parse_double_list(text, &value, &given) && given == count)
+    memcpy(out, value, count * sizeof *out);
+  else
+    argp_error(state, "%s: '%s' is not %s", flag, text, expected);
+  free(value);
+}
+
+void pb_option_band(const struct argp_state *state, const char *flag, const char *text, double *f1,
+                    double *f2) {
+  static const char expected[] = "two frequencies 0 < F1 < F2";
+  double hz[2] = {0};
+  pb_option_numbers(state, flag, text, hz, 2, expected);
+  if (!(hz[0] > 0 && hz[1] > hz[0])) argp_error(state, "%s: '%s' is not %s", flag, text, expected);
+  *f1 = hz[0];
+  *f2 = hz[1];
+}
+
+void pb_option_direction(const struct argp_state *state, const char *flag, const char *text,
+                         double xyz[3]) {
+  static const char expected[] = "a direction X,Y,Z";
+  pb_option_numbers(state, flag, text, xyz, 3, expected);
+  if (xyz[0] == 0 && xyz[1] == 0 && xyz[2] == 0)
+    argp_error(state, "%s: '%s' is not %s", flag, text, expected);
+}
+
+void pb_option_frames(const struct argp_state *state, const char *flag, const char *text,
+                      size_t frames[2]) {
+  static const char expected[] = "two different frames, counted from 1";
+  double value[2] = {0};
+  pb_option_numbers(state, flag, text, value, 2, expected);
+  bool good = value[0] != value[1];
+  for (size_t i = 0; i < 2; i++) {
+    frames[i] = value[i] >= 1 && value[i] <= 1e6 ? (size_t)value[i] : 0;
+    good = good && frames[i] > 0 && (double)frames[i] == value[i];
+  }
+  if (!good) argp_error(state, "%s: '%s' is not %s", flag, text, expected);
+}
+
 // ---- --domain and --plant -----------------------------------------------------------------------
 
 static const struct argp_option common_option[] = {

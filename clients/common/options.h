@@ -53,6 +53,18 @@ void pb_option_double_list(const struct argp_state *state, const char *flag, con
 void pb_option_names(const struct argp_state *state, const char *flag, const char *text,
                      pb_name_list *list);
 
+// Lists of a known length: exactly `count` numbers, `expected` says in the message what they are
+// ("two positive frequencies"); a band 0 < F1 < F2 in Hz; a direction X,Y,Z, not of unit length;
+// two different frames, counted from 1.
+void pb_option_numbers(const struct argp_state *state, const char *flag, const char *text,
+                       double *out, size_t count, const char *expected);
+void pb_option_band(const struct argp_state *state, const char *flag, const char *text, double *f1,
+                    double *f2);
+void pb_option_direction(const struct argp_state *state, const char *flag, const char *text,
+                         double xyz[3]);
+void pb_option_frames(const struct argp_state *state, const char *flag, const char *text,
+                      size_t frames[2]);
+
 // --domain N and --plant NAME, for tools that talk to a daemon. Use pb_common_argp as an argp child
 // and hand it a pb_common_options as its input (state->child_inputs[...]) on ARGP_KEY_INIT.
 typedef struct pb_common_options {

@@ -16,17 +16,12 @@ static const char description[] =
     "  plantbus-control hac --live --bandwidth 100 --json\n";
 
 static error_t parse(int key, char *text, struct argp_state *state) {
+  (void)text;
   control_options *o = state->input;
   switch (key) {
   case ARGP_KEY_INIT:
     state->child_inputs[0] = o;
-    return 0;
-  case ARGP_KEY_ARG:
-    if (o->file) argp_error(state, "unexpected argument '%s'", text);
-    o->file = text;
-    return 0;
-  case ARGP_KEY_END:
-    if (!o->file == !o->live) argp_error(state, "a plant file is wanted, or --live");
+    state->child_inputs[1] = &o->source;
     return 0;
   default:
     return ARGP_ERR_UNKNOWN;
@@ -34,13 +29,12 @@ static error_t parse(int key, char *text, struct argp_state *state) {
 }
 
 static pb_status present(const control_design *d, const control_judgement *j, pb_error *err) {
-  const iff_options *o = &d->options->iff;
-  const char *dir = o->output_dir ? o->output_dir : ".";
+  const pb_result_options *o = &d->options->iff.result;
   pb_status status = o->json ? control_print_json(d, j, err) : control_print(d, j, err);
-  if (status == PB_OK && o->output_dir) status = control_save(d, j, dir, err);
-  if (status == PB_OK && o->plot) status = control_plot(d, j, dir, err);
-  if (status == PB_OK && !d->stable && !o->force) {
-    status = pb_fail(err, PB_ERR_STATE, "bandwidth", "with %g Hz the closed loop is unstable",
+  if (status == PB_OK && o->dir) status = control_save(d, j, o->dir, err);
+  if (status == PB_OK && o->plot) status = control_plot(d, j, pb_result_dir(o), err);
+  if (status == PB_OK && !d->stable && !d->options->iff.force) {
+    status = pb_fail(err, PB_ERR_STATE, "--bandwidth", "with %g Hz the closed loop is unstable",
                      d->shape.bandwidth_hz);
   }
   return status;
@@ -50,7 +44,8 @@ static pb_status design(const control_options *o, pb_error *err) {
   control_plant plant;
   control_design d = {0};
   control_judgement j = {0};
-  pb_status status = control_plant_open(o->file, &o->iff, &plant, err);
+  pb_status status = pb_result_check(&o->iff.result, err);
+  if (status == PB_OK) status = control_plant_open(o->source.file, &o->iff, &plant, err);
   if (status != PB_OK) return status;
   status = control_design_make(o, &plant, &d, err);
   if (status == PB_OK) status = control_judge(&d, &j, err);
@@ -62,7 +57,8 @@ static pb_status design(const control_options *o, pb_error *err) {
 }
 
 int command_hac(int argc, char **argv) {
-  static const struct argp_child children[] = {{&control_argp, 0, NULL, 0}, {0}};
+  static const struct argp_child children[] = {
+      {&control_argp, 0, NULL, 0}, {&control_source_argp, 0, NULL, 0}, {0}};
   static const struct argp argp = {NULL, parse, "[PLANT]", description, children, NULL, NULL};
   control_options options;
   pb_error err = {0};
@@ -70,7 +66,6 @@ int command_hac(int argc, char **argv) {
   options.iff.excite.reset = PB_RESET_NEVER;
   pb_options_parse(&argp, argc, argv, &options);
   pb_status status = design(&options, &err);
-  if (status != PB_OK) pb_print_error(stderr, &err);
   control_options_free(&options);
-  return status == PB_OK ? PB_EXIT_DONE : PB_EXIT_FAILED;
+  return pb_result_end(status, &err);
 }

@@ -6,14 +6,8 @@
 
 typedef struct iff_command {
   iff_options iff;
-  const char *file;
-  bool live;
+  control_source source;
 } iff_command;
-
-enum { KEY_LIVE = 0x500 };
-
-static const struct argp_option option_table[] = {
-    {"live", KEY_LIVE, NULL, 0, "Measure on the plant on the bus too, not only predict", 1}, {0}};
 
 static const char description[] =
     "Finds the gain of decentralised IFF that gives the modes of the band their largest smallest "
@@ -27,20 +21,12 @@ static const char description[] =
     "  plantbus-control iff --live --band 5,250\n";
 
 static error_t parse(int key, char *text, struct argp_state *state) {
+  (void)text;
   iff_command *o = state->input;
   switch (key) {
   case ARGP_KEY_INIT:
     state->child_inputs[0] = &o->iff;
-    return 0;
-  case KEY_LIVE:
-    o->live = true;
-    return 0;
-  case ARGP_KEY_ARG:
-    if (o->file) argp_error(state, "unexpected argument '%s'", text);
-    o->file = text;
-    return 0;
-  case ARGP_KEY_END:
-    if (!o->file == !o->live) argp_error(state, "a plant file is wanted, or --live");
+    state->child_inputs[1] = &o->source;
     return 0;
   default:
     return ARGP_ERR_UNKNOWN;
@@ -50,31 +36,32 @@ static error_t parse(int key, char *text, struct argp_state *state) {
 static pb_status damp(const iff_command *o, pb_error *err) {
   control_plant plant;
   iff_result result = {0};
-  pb_status status = control_plant_open(o->file, &o->iff, &plant, err);
+  const pb_result_options *files = &o->iff.result;
+  pb_status status = pb_result_check(files, err);
+  if (status == PB_OK) status = control_plant_open(o->source.file, &o->iff, &plant, err);
   if (status != PB_OK) return status;
   status = iff_prepare(&o->iff, &plant.bench, &result, err);
-  if (status == PB_OK && o->live) status = iff_measure(&result, &plant.bench, err);
+  if (status == PB_OK && o->source.live) status = iff_measure(&result, &plant.bench, err);
   if (status == PB_OK) status = iff_present(&result, err);
-  if (status == PB_OK && (o->iff.output_dir || o->iff.plot))
-    status = control_damped_plant(&result, err);
-  if (status == PB_OK && o->iff.output_dir)
-    status = control_export(&result, NULL, o->iff.output_dir, err);
+  if (status == PB_OK && (files->dir || files->plot)) status = control_damped_plant(&result, err);
+  if (status == PB_OK && files->dir) status = control_export(&result, NULL, files->dir, err);
   iff_result_clear(&result);
   control_plant_close(&plant);
   return status;
 }
 
 int command_iff(int argc, char **argv) {
-  static const struct argp_child children[] = {{&iff_argp, 0, NULL, 0}, {0}};
-  static const struct argp argp = {option_table, parse, "[PLANT]", description,
-                                   children,     NULL,  NULL};
+  static const struct argp_child children[] = {
+      {&iff_argp, 0, NULL, 0}, {&control_source_argp, 0, NULL, 0}, {0}};
+  static const struct argp argp = {NULL, parse, "[PLANT]", description, children, NULL, NULL};
   iff_command options = {0};
   pb_error err = {0};
   iff_options_default(&options.iff);
+  options.iff.result.files_help =
+      "Write iff.mat, CSV files, the predicted plant and the controller (JSON) into DIR";
   pb_options_parse(&argp, argc, argv, &options);
   pb_interrupt_install();
   pb_status status = damp(&options, &err);
-  if (status != PB_OK) pb_print_error(stderr, &err);
   iff_options_free(&options.iff);
-  return status == PB_OK ? PB_EXIT_DONE : PB_EXIT_FAILED;
+  return pb_result_end(status, &err);
 }

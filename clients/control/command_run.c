@@ -37,7 +37,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
 
 static pb_status check(const control_design *d, pb_error *err) {
   if (d->stable || d->options->iff.force) return PB_OK;
-  return pb_fail(err, PB_ERR_STATE, "bandwidth",
+  return pb_fail(err, PB_ERR_STATE, "--bandwidth",
                  "with %g Hz the closed loop is predicted to be unstable: a pole at %.6g Hz with "
                  "damping %.3g %% (--force closes it all the same)",
                  d->shape.bandwidth_hz, d->worst.hz, 100 * d->worst.damping);
@@ -81,11 +81,10 @@ static pb_status measure(run_result *r, pb_error *err) {
 }
 
 static pb_status present(const run_result *r, pb_error *err) {
-  const iff_options *o = &r->design->options->iff;
-  const char *dir = o->output_dir ? o->output_dir : ".";
+  const pb_result_options *o = &r->design->options->iff.result;
   pb_status status = o->json ? run_print_json(r, err) : run_print(r, err);
-  if (status == PB_OK && o->output_dir) status = run_save(r, dir, err);
-  if (status == PB_OK && o->plot) status = run_plot(r, dir, err);
+  if (status == PB_OK && o->dir) status = run_save(r, o->dir, err);
+  if (status == PB_OK && o->plot) status = run_plot(r, pb_result_dir(o), err);
   return status;
 }
 
@@ -107,7 +106,8 @@ static void result_clear(run_result *r) {
 static pb_status run(const control_options *o, pb_error *err) {
   control_plant plant;
   control_design d = {0};
-  pb_status status = control_plant_open(NULL, &o->iff, &plant, err);
+  pb_status status = pb_result_check(&o->iff.result, err);
+  if (status == PB_OK) status = control_plant_open(NULL, &o->iff, &plant, err);
   if (status != PB_OK) return status;
   run_result r = {.design = &d, .bench = &plant.bench};
   status = control_design_make(o, &plant, &d, err);
@@ -133,7 +133,6 @@ int command_run(int argc, char **argv) {
   pb_options_parse(&argp, argc, argv, &options);
   pb_interrupt_install();
   pb_status status = run(&options, &err);
-  if (status != PB_OK) pb_print_error(stderr, &err);
   control_options_free(&options);
-  return status == PB_OK ? PB_EXIT_DONE : PB_EXIT_FAILED;
+  return pb_result_end(status, &err);
 }

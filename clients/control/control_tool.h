@@ -13,15 +13,22 @@
 
 typedef enum jacobian_source { JACOBIAN_AUTO, JACOBIAN_GEOMETRY, JACOBIAN_STATIC } jacobian_source;
 
+// The plant of iff and hac: one of the two.
+typedef struct control_source {
+  const char *file;  // NULL: the plant on the bus
+  bool live;
+} control_source;
+
+extern const struct argp control_source_argp;  // argp child; its input is a control_source
+
 // The command line of hac and run.
 typedef struct control_options {
-  iff_options iff;      // bus, excitation, low authority loops (sensors: outputs), files
-  const char *file;     // the plant file; NULL: the plant on the bus
-  bool live;            // hac: the plant on the bus
-  bool no_iff;          // HAC alone
-  bool cartesian;       // frame
-  double bandwidth_hz;  // 0: not given
-  double lead;          // −1: default, as the next two
+  iff_options iff;        // bus, excitation, low authority loops (sensors: outputs), files
+  control_source source;  // hac
+  bool no_iff;            // HAC alone
+  bool cartesian;         // frame
+  double bandwidth_hz;    // 0: not given
+  double lead;            // −1: default, as the next two
   double integrator_hz;
   double lowpass_hz;
   jacobian_source jacobian;

@@ -136,12 +136,12 @@ static pb_status plot_channels(const damped_plant *p, const char *dir, pb_error 
 }
 
 pb_status control_damped_plant(const iff_result *iff, pb_error *err) {
-  const iff_options *o = iff->options;
-  const char *dir = o->output_dir ? o->output_dir : ".";
+  const pb_result_options *o = &iff->options->result;
+  const char *dir = pb_result_dir(o);
   damped_plant p;
   pb_status status = damped_plant_make(iff, &p, err);
-  if (status == PB_OK && o->output_dir) status = save_csv(&p, dir, err);
-  if (status == PB_OK && o->output_dir) status = save_mat(&p, dir, err);
+  if (status == PB_OK && o->dir) status = save_csv(&p, dir, err);
+  if (status == PB_OK && o->dir) status = save_mat(&p, dir, err);
   if (status == PB_OK && o->plot) status = plot_channels(&p, dir, err);
   damped_plant_clear(&p);
   return status;

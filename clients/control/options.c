@@ -4,9 +4,7 @@
 #include "control_tool.h"
 
 enum {
-  KEY_JSON = 0x200,
-  KEY_PLOT,
-  KEY_LIVE,
+  KEY_LIVE = 0x200,
   KEY_FRAME,
   KEY_BANDWIDTH,
   KEY_LEAD,
@@ -29,10 +27,6 @@ enum {
 };
 
 static const struct argp_option option_table[] = {
-    {"json", KEY_JSON, NULL, 0, "Print JSON instead of tables", 1},
-    {"output-dir", 'o', "DIR", 0, "Write MAT, CSV and the controllers (JSON) into DIR", 1},
-    {"plot", KEY_PLOT, NULL, 0, "Draw the figures (PNG) into DIR, or here", 1},
-    {"live", KEY_LIVE, NULL, 0, "hac: take the model of the plant on the bus, not a file", 1},
     {"force", KEY_FORCE, NULL, 0, "Export or close a loop that is predicted to be unstable", 1},
     {"frame", KEY_FRAME, "FRAME", 0,
      "strut (default): a loop a strut; cartesian: a loop a direction of the point of interest", 2},
@@ -67,6 +61,33 @@ static const struct argp_option option_table[] = {
     {"keep", KEY_KEEP, NULL, 0, "run: leave the hosted controllers running", 5},
     {0},
 };
+
+// ---- the plant of iff and hac -------------------------------------------------------------------
+
+static const struct argp_option source_table[] = {
+    {"live", KEY_LIVE, NULL, 0, "Take the plant on the bus, not a file", 1}, {0}};
+
+static error_t parse_source(int key, char *text, struct argp_state *state) {
+  control_source *o = state->input;
+  switch (key) {
+  case KEY_LIVE:
+    o->live = true;
+    return 0;
+  case ARGP_KEY_ARG:
+    if (o->file) argp_error(state, "unexpected argument '%s'", text);
+    o->file = text;
+    return 0;
+  case ARGP_KEY_END:
+    if (!o->file == !o->live) argp_error(state, "a plant file is wanted, or --live");
+    return 0;
+  default:
+    return ARGP_ERR_UNKNOWN;
+  }
+}
+
+const struct argp control_source_argp = {source_table, parse_source, NULL, NULL, NULL, NULL, NULL};
+
+// ---- hac and run --------------------------------------------------------------------------------
 
 static void parse_frame(struct argp_state *state, const char *text, control_options *o) {
   if (strcmp(text, "strut") != 0 && strcmp(text, "cartesian") != 0) {
@@ -132,17 +153,8 @@ static bool parse_channels(int key, char *text, struct argp_state *state, contro
   }
 }
 
-static bool parse_flags(int key, char *text, control_options *o) {
+static bool parse_flags(int key, control_options *o) {
   switch (key) {
-  case KEY_JSON:
-    return o->iff.json = true;
-  case KEY_PLOT:
-    return o->iff.plot = true;
-  case 'o':
-    o->iff.output_dir = text;
-    return true;
-  case KEY_LIVE:
-    return o->live = true;
   case KEY_FORCE:
     return o->iff.force = true;
   case KEY_NO_IFF:
@@ -164,6 +176,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
   case ARGP_KEY_INIT:
     state->child_inputs[0] = &o->iff.common;
     state->child_inputs[1] = &o->iff.excite;
+    state->child_inputs[2] = &o->iff.result;
     return 0;
   case KEY_IFF_GAIN:
     iff_parse_gain(state, "--iff-gain", text, &o->iff);
@@ -183,13 +196,14 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     break;
   }
   bool known = parse_shape(key, text, state, o) || parse_channels(key, text, state, o) ||
-               parse_flags(key, text, o);
+               parse_flags(key, o);
   return known ? 0 : ARGP_ERR_UNKNOWN;
 }
 
 static const struct argp_child children[] = {
     {&pb_common_argp, 0, NULL, 0},
     {&pb_excite_argp, 0, "Disturbance (run) and band of the modes:", 9},
+    {&pb_result_argp, 0, NULL, 0},
     {0}};
 
 const struct argp control_argp = {option_table, parse, NULL, NULL, children, NULL, NULL};
@@ -197,6 +211,9 @@ const struct argp control_argp = {option_table, parse, NULL, NULL, children, NUL
 void control_options_default(control_options *o) {
   *o = (control_options){.lead = -1, .integrator_hz = -1, .lowpass_hz = -1};
   iff_options_default(&o->iff);
+  o->iff.result =
+      (pb_result_options){.files_help = "Write MAT, CSV and the controllers (JSON) into DIR",
+                          .plot_help = "Draw the figures (PNG) into DIR, or here"};
 }
 
 void control_options_free(control_options *o) {

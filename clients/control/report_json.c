@@ -148,5 +148,5 @@ pb_status control_print_json(const control_design *d, const control_judgement *j
   json_transmission(&o, d, j);
   pb_jsonout_object_end(&o);
   pb_jsonout_end(&o);
-  return ferror(stdout) ? pb_fail(err, PB_ERR_IO, "stdout", "the report cannot be written") : PB_OK;
+  return pb_result_flush(err);
 }

@@ -141,5 +141,5 @@ pb_status run_print_json(const run_result *r, pb_error *err) {
   }
   pb_jsonout_object_end(&o);
   pb_jsonout_end(&o);
-  return ferror(stdout) ? pb_fail(err, PB_ERR_IO, "stdout", "the report cannot be written") : PB_OK;
+  return pb_result_flush(err);
 }

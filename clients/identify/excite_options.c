@@ -1,7 +1,6 @@
 // Options of an excitation: see excite_options.h.
 #include "excite_options.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 enum {
@@ -80,16 +79,12 @@ static void parse_excitation(struct argp_state *state, const char *text, pb_exci
 }
 
 static void parse_band(struct argp_state *state, const char *text, pb_experiment_options *e) {
-  double *value = NULL;
-  size_t count = 0;
-  pb_option_double_list(state, "--band", text, &value, &count);
-  if (count != 2 || !(value[0] >= 0 && value[0] < value[1])) {
-    argp_error(state, "--band: '%s' is not F1,F2 with 0 <= F1 < F2", text);
-  } else {
-    e->f1 = value[0];
-    e->f2 = value[1];
-  }
-  free(value);
+  static const char expected[] = "F1,F2 with 0 <= F1 < F2";
+  double hz[2] = {0};
+  pb_option_numbers(state, "--band", text, hz, 2, expected);
+  if (!(hz[0] >= 0 && hz[0] < hz[1])) argp_error(state, "--band: '%s' is not %s", text, expected);
+  e->f1 = hz[0];
+  e->f2 = hz[1];
 }
 
 static void parse_words(int key, const char *text, struct argp_state *state, pb_excite_options *o) {

@@ -1,10 +1,8 @@
 // Writing measured frequency responses: see frf_files.h.
 #include "frf_files.h"
 
-#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "csv.h"
 
@@ -12,18 +10,6 @@ void pb_channel_unit(const pb_model *model, size_t output, size_t input, char *t
   const char *y = model->output[output].unit, *u = model->input[input].unit;
   bool compound = strchr(y, '/') != NULL;
   snprintf(text, size, compound ? "(%s)/%s" : "%s/%s", y, u);
-}
-
-pb_status pb_output_path(const char *dir, const char *name, char *text, size_t size,
-                         pb_error *err) {
-  if (mkdir(dir, 0777) != 0 && errno != EEXIST) {
-    return pb_fail(err, PB_ERR_IO, dir, "the directory cannot be created: %s", strerror(errno));
-  }
-  int written = snprintf(text, size, "%s/%s", dir, name);
-  if (written < 0 || (size_t)written >= size) {
-    return pb_fail(err, PB_ERR_ARGUMENT, dir, "the path is too long");
-  }
-  return PB_OK;
 }
 
 static void column(pb_csv *csv, const char *what, const char *output, const char *input,

@@ -4,6 +4,7 @@
 
 #include "experiment.h"
 #include "matfile.h"
+#include "results.h"
 
 // A measured response with the exact one beside it, and the names of its channels.
 typedef struct pb_frf_record {
@@ -26,8 +27,5 @@ void pb_frf_write_names(const pb_frf_record *record, pb_matfile *mat);
 
 // "m/V", "(m/s^2)/N"; in text of the given size, always terminated. [any]
 void pb_channel_unit(const pb_model *model, size_t output, size_t input, char *text, size_t size);
-
-// DIR/NAME in text; PB_ERR_ARGUMENT when it does not fit. Creates DIR when it is missing.
-pb_status pb_output_path(const char *dir, const char *name, char *text, size_t size, pb_error *err);
 
 #endif

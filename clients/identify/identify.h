@@ -5,6 +5,7 @@
 #include "analysis.h"
 #include "bench.h"
 #include "excite_options.h"
+#include "results.h"
 
 // The command line.
 typedef struct identify_options {
@@ -14,9 +15,8 @@ typedef struct identify_options {
   double coherence_target;  // 0: none
   uint32_t block;           // steps of a block; 0: step by step
   size_t most_averages;     // with a target; 0: 16 times the first
-  const char *output_dir;   // NULL: no files, unless plots are wanted
   const char *samples;      // file of the raw samples, or NULL
-  bool json, plot;
+  pb_result_options result;
 } identify_options;
 
 // What was done and found.

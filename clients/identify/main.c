@@ -9,10 +9,8 @@
 #include "interrupt.h"
 
 enum {
-  KEY_JSON = 0x100,
-  KEY_INPUT,
+  KEY_INPUT = 0x100,
   KEY_OUTPUT,
-  KEY_PLOT,
   KEY_TARGET,
   KEY_MOST,
   KEY_SAVE,
@@ -20,9 +18,6 @@ enum {
 };
 
 static const struct argp_option option_table[] = {
-    {"json", KEY_JSON, NULL, 0, "Print JSON instead of tables", 1},
-    {"output-dir", 'o', "DIR", 0, "Write identify.csv and identify.mat into DIR", 1},
-    {"plot", KEY_PLOT, NULL, 0, "Draw Bode and coherence plots (PNG) into DIR, or here", 1},
     {"blocks", KEY_BLOCKS, "STEPS", OPTION_ARG_OPTIONAL,
      "Send and receive so many steps at a time (default 1000) instead of one: for a plant that "
      "nobody else steps",
@@ -59,15 +54,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
   case ARGP_KEY_INIT:
     state->child_inputs[0] = &o->common;
     state->child_inputs[1] = &o->excite;
-    break;
-  case KEY_JSON:
-    o->json = true;
-    break;
-  case KEY_PLOT:
-    o->plot = true;
-    break;
-  case 'o':
-    o->output_dir = text;
+    state->child_inputs[2] = &o->result;
     break;
   case KEY_SAVE:
     o->samples = text;
@@ -218,11 +205,10 @@ static pb_status measure(const identify_options *o, pb_bench *bench,
   return status;
 }
 
-static pb_status present(const identify_options *o, const identify_result *result, pb_error *err) {
+static pb_status present(const pb_result_options *o, const identify_result *result, pb_error *err) {
   pb_status status = o->json ? identify_print_json(result, err) : identify_print(result, err);
-  const char *dir = o->output_dir ? o->output_dir : ".";
-  if (status == PB_OK && o->output_dir) status = identify_save(result, dir, err);
-  if (status == PB_OK && o->plot) status = identify_plot(result, dir, err);
+  if (status == PB_OK && o->dir) status = identify_save(result, o->dir, err);
+  if (status == PB_OK && o->plot) status = identify_plot(result, pb_result_dir(o), err);
   return status;
 }
 
@@ -231,7 +217,8 @@ static pb_status identify(const identify_options *o, pb_error *err) {
   size_t *input = NULL, *output = NULL;
   pb_experiment_channels channels = {0};
   pb_experiment *experiment = NULL;
-  pb_status status = pb_bench_open(&o->common, o->excite.reset, &bench, err);
+  pb_status status = pb_result_check(&o->result, err);
+  if (status == PB_OK) status = pb_bench_open(&o->common, o->excite.reset, &bench, err);
   if (status != PB_OK) return status;
   bench.block = o->block;
   if (o->block > 0 && bench.realtime)
@@ -251,7 +238,7 @@ static pb_status identify(const identify_options *o, pb_error *err) {
   if (experiment) pb_bench_tell_trouble(experiment);
   if (status == PB_OK) {
     result.trouble = pb_experiment_trouble_of(experiment);
-    status = present(o, &result, err);
+    status = present(&o->result, &result, err);
   }
   pb_analysis_clear(&result.analysis);
   pb_experiment_free(experiment);
@@ -262,17 +249,20 @@ static pb_status identify(const identify_options *o, pb_error *err) {
 }
 
 int main(int argc, char **argv) {
-  static const struct argp_child children[] = {
-      {&pb_common_argp, 0, NULL, 0}, {&pb_excite_argp, 0, "Excitation:", 9}, {0}};
+  static const struct argp_child children[] = {{&pb_common_argp, 0, NULL, 0},
+                                               {&pb_excite_argp, 0, "Excitation:", 9},
+                                               {&pb_result_argp, 0, NULL, 0},
+                                               {0}};
   static const struct argp argp = {option_table, parse, NULL, description, children, NULL, NULL};
-  identify_options options = {0};
+  identify_options options = {
+      .result = {.files_help = "Write identify.csv and identify.mat into DIR",
+                 .plot_help = "Draw Bode and coherence plots (PNG) into DIR, or here"}};
   pb_error err = {0};
   pb_excite_options_default(&options.excite);
   pb_options_parse(&argp, argc, argv, &options);
   pb_interrupt_install();
   pb_status status = identify(&options, &err);
-  if (status != PB_OK) pb_print_error(stderr, &err);
   pb_name_list_free(&options.inputs);
   pb_name_list_free(&options.outputs);
-  return status == PB_OK ? PB_EXIT_DONE : PB_EXIT_FAILED;
+  return pb_result_end(status, &err);
 }

@@ -299,5 +299,5 @@ pb_status identify_print_json(const identify_result *r, pb_error *err) {
   json_frf(&j, a);
   pb_jsonout_object_end(&j);
   pb_jsonout_end(&j);
-  return ferror(stdout) ? pb_fail(err, PB_ERR_IO, "stdout", "the report cannot be written") : PB_OK;
+  return pb_result_flush(err);
 }

@@ -7,6 +7,7 @@
 #include "control/iff.h"
 #include "control/rootlocus.h"
 #include "excite_options.h"
+#include "results.h"
 
 // The command line.
 typedef struct iff_options {
@@ -21,8 +22,7 @@ typedef struct iff_options {
   int delay;            // samples; −1: as the mode has it
   bool skip_open_loop;  // do not measure the undamped plant
   bool force;           // close a loop that is predicted to be unstable
-  const char *output_dir;
-  bool json, plot;
+  pb_result_options result;
 } iff_options;
 
 // All of the command line; its input is an iff_options. Positional arguments are the tool's.

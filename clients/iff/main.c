@@ -18,7 +18,8 @@ static const char description[] =
 static pb_status damp(const iff_options *o, pb_error *err) {
   pb_bench bench = {0};
   iff_result result = {0};
-  pb_status status = pb_bench_open(&o->common, o->excite.reset, &bench, err);
+  pb_status status = pb_result_check(&o->result, err);
+  if (status == PB_OK) status = pb_bench_open(&o->common, o->excite.reset, &bench, err);
   if (status != PB_OK) return status;
   status = iff_prepare(o, &bench, &result, err);
   if (status == PB_OK) status = iff_measure(&result, &bench, err);
@@ -37,7 +38,6 @@ int main(int argc, char **argv) {
   pb_options_parse(&argp, argc, argv, &options);
   pb_interrupt_install();
   pb_status status = damp(&options, &err);
-  if (status != PB_OK) pb_print_error(stderr, &err);
   iff_options_free(&options);
-  return status == PB_OK ? PB_EXIT_DONE : PB_EXIT_FAILED;
+  return pb_result_end(status, &err);
 }

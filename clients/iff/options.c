@@ -1,14 +1,11 @@
 // The options of an IFF experiment, an argp child, and what they default to.
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "iff_tool.h"
 
 enum {
-  KEY_JSON = 0x100,
-  KEY_PLOT,
-  KEY_INPUT,
+  KEY_INPUT = 0x100,
   KEY_OUTPUT,
   KEY_STRUT,
   KEY_GAIN,
@@ -20,10 +17,6 @@ enum {
 };
 
 static const struct argp_option option_table[] = {
-    {"json", KEY_JSON, NULL, 0, "Print JSON instead of tables", 1},
-    {"output-dir", 'o', "DIR", 0, "Write iff.mat and CSV files into DIR", 1},
-    {"plot", KEY_PLOT, NULL, 0, "Draw the root locus and the damped plant (PNG) into DIR, or here",
-     1},
     {"gain", KEY_GAIN, "G", 0,
      "Gain of K = G/(s + 2π·2) · s/(s + 2π·0.5), or auto (default): the one that gives the modes "
      "of "
@@ -44,23 +37,18 @@ static const struct argp_option option_table[] = {
 };
 
 void iff_parse_gain(struct argp_state *state, const char *flag, const char *text, iff_options *o) {
-  if (strcmp(text, "auto") == 0) return;
-  o->gain = pb_option_double(state, flag, text, 1e-12, 1e12);
-  o->gain_given = true;
+  o->gain_given = strcmp(text, "auto") != 0;
+  if (o->gain_given) o->gain = pb_option_double(state, flag, text, 1e-12, 1e12);
 }
 
 void iff_parse_corners(struct argp_state *state, const char *flag, const char *text,
                        iff_options *o) {
-  double *value = NULL;
-  size_t count = 0;
-  pb_option_double_list(state, flag, text, &value, &count);
-  if (count != 2 || !(value[0] > 0 && value[1] > 0)) {
-    argp_error(state, "%s: '%s' is not two positive frequencies", flag, text);
-  } else {
-    o->integrator_hz = value[0];
-    o->highpass_hz = value[1];
-  }
-  free(value);
+  static const char expected[] = "two positive frequencies";
+  double hz[2] = {0};
+  pb_option_numbers(state, flag, text, hz, 2, expected);
+  if (!(hz[0] > 0 && hz[1] > 0)) argp_error(state, "%s: '%s' is not %s", flag, text, expected);
+  o->integrator_hz = hz[0];
+  o->highpass_hz = hz[1];
 }
 
 static void parse_sign(struct argp_state *state, const char *text, iff_options *o) {
@@ -76,15 +64,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
   case ARGP_KEY_INIT:
     state->child_inputs[0] = &o->common;
     state->child_inputs[1] = &o->excite;
-    break;
-  case KEY_JSON:
-    o->json = true;
-    break;
-  case KEY_PLOT:
-    o->plot = true;
-    break;
-  case 'o':
-    o->output_dir = text;
+    state->child_inputs[2] = &o->result;
     break;
   case KEY_INPUT:
     pb_option_names(state, "--input", text, &o->inputs);
@@ -119,13 +99,19 @@ static error_t parse(int key, char *text, struct argp_state *state) {
   return 0;
 }
 
-static const struct argp_child children[] = {
-    {&pb_common_argp, 0, NULL, 0}, {&pb_excite_argp, 0, "Excitation:", 9}, {0}};
+static const struct argp_child children[] = {{&pb_common_argp, 0, NULL, 0},
+                                             {&pb_excite_argp, 0, "Excitation:", 9},
+                                             {&pb_result_argp, 0, NULL, 0},
+                                             {0}};
 
 const struct argp iff_argp = {option_table, parse, NULL, NULL, children, NULL, NULL};
 
 void iff_options_default(iff_options *o) {
-  *o = (iff_options){.sign = 1, .delay = -1};
+  *o = (iff_options){
+      .sign = 1,
+      .delay = -1,
+      .result = {.files_help = "Write iff.mat and CSV files into DIR",
+                 .plot_help = "Draw the root locus and the damped plant (PNG) into DIR, or here"}};
   pb_excite_options_default(&o->excite);
 }
 

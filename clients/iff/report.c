@@ -169,5 +169,5 @@ pb_status iff_print_json(const iff_result *r, pb_error *err) {
   json_measurement(&j, "damped", &r->closed);
   pb_jsonout_object_end(&j);
   pb_jsonout_end(&j);
-  return ferror(stdout) ? pb_fail(err, PB_ERR_IO, "stdout", "the report cannot be written") : PB_OK;
+  return pb_result_flush(err);
 }

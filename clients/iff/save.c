@@ -107,10 +107,9 @@ pb_status iff_save(const iff_result *r, const char *dir, pb_error *err) {
 }
 
 pb_status iff_present(const iff_result *r, pb_error *err) {
-  const iff_options *o = r->options;
+  const pb_result_options *o = &r->options->result;
   pb_status status = o->json ? iff_print_json(r, err) : iff_print(r, err);
-  const char *dir = o->output_dir ? o->output_dir : ".";
-  if (status == PB_OK && o->output_dir) status = iff_save(r, dir, err);
-  if (status == PB_OK && o->plot) status = iff_plot(r, dir, err);
+  if (status == PB_OK && o->dir) status = iff_save(r, o->dir, err);
+  if (status == PB_OK && o->plot) status = iff_plot(r, pb_result_dir(o), err);
   return status;
 }

@@ -43,7 +43,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     o->model = text;
     return 0;
   case KEY_NODES:
-    source_option_frames(state, "--nodes", text, o->nodes);
+    pb_option_frames(state, "--nodes", text, o->nodes);
     o->element_option = true;
     return 0;
   case KEY_DAMPING:
@@ -60,7 +60,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     o->check = true;
     return 0;
   case KEY_BAND:
-    source_option_range(state, "--range", text, &o->f1, &o->f2);
+    pb_option_band(state, "--range", text, &o->f1, &o->f2);
     return 0;
   case ARGP_KEY_ARG:
     if (o->file) argp_error(state, "unexpected argument '%s'", text);
@@ -165,7 +165,7 @@ static void result_clear(joint_result *r) {
 }
 
 int command_characterize(int argc, char **argv) {
-  static const struct argp_child children[] = {{&result_argp, 0, NULL, 0}, {0}};
+  static const struct argp_child children[] = {{&pb_result_argp, 0, NULL, 0}, {0}};
   static const struct argp argp = {
       option_table,
       parse,
@@ -190,7 +190,7 @@ int command_characterize(int argc, char **argv) {
     judge(&o, &r);
     st = joint_present(&o, &r, &err);
   }
-  int code = result_end(st, &err);
+  int code = pb_result_end(st, &err);
   if (code == PB_EXIT_DONE && o.check && r.missed > 0) code = PB_EXIT_FAILED;
   result_clear(&r);
   return code;

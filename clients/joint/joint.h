@@ -19,7 +19,7 @@ typedef struct joint_options {
   double stroke;  // rad; 0: unknown
   bool check, element_option;
   double f1, f2;  // Hz
-  result_options result;
+  pb_result_options result;
 } joint_options;
 
 typedef struct joint_result {

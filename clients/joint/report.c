@@ -113,9 +113,9 @@ static pb_status save(const joint_options *o, const joint_result *r, pb_error *e
   pb_matfile *mat;
   for (int i = 0; i < 6; i++)
     list[i] = (response){directions[i], i < 3 ? "m/N" : "rad/(Nm)", r->compliance[i]};
-  pb_status st = result_path(&o->result, "joint.csv", path, sizeof path, err);
+  pb_status st = pb_result_path(&o->result, "joint.csv", path, sizeof path, err);
   if (!st) st = responses_csv(path, r->hz, JOINT_POINTS, list, 6, err);
-  if (!st) st = result_path(&o->result, "joint.mat", path, sizeof path, err);
+  if (!st) st = pb_result_path(&o->result, "joint.mat", path, sizeof path, err);
   if (!st) st = pb_matfile_open(path, &mat, err);
   if (st) return st;
   pb_matfile_text(mat, "name", r->name);
@@ -159,7 +159,7 @@ static pb_status plot(const joint_options *o, const joint_result *r, pb_error *e
                                  .shared_x = true,
                                  .count = (size_t)((count[0] > 0) + (count[1] > 0)),
                                  .panel = panel + first};
-  pb_status st = result_path(&o->result, "joint.png", path, sizeof path, err);
+  pb_status st = pb_result_path(&o->result, "joint.png", path, sizeof path, err);
   if (!st && figure.count == 0)
     st = pb_fail(err, PB_ERR_ARGUMENT, "--plot", "the joint gives way in no direction");
   if (!st) st = pb_plot(path, &figure, err);

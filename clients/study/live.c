@@ -252,7 +252,7 @@ static pb_status print_json(const live *l, pb_error *err) {
   pb_jsonout_array_end(&j);
   pb_jsonout_object_end(&j);
   pb_jsonout_end(&j);
-  return ferror(stdout) ? pb_fail(err, PB_ERR_IO, "stdout", "the report cannot be written") : PB_OK;
+  return pb_result_flush(err);
 }
 
 // ---- all of it ----------------------------------------------------------------------------------
@@ -299,7 +299,7 @@ pb_status study_live(const study_options *o, pb_error *err) {
     if (!status) status = measure(&l, &l.row[k], err);
   }
   status = give_back(&l, status, err);
-  if (!status) status = o->json ? print_json(&l, err) : print_rows(&l, err);
+  if (!status) status = o->result.json ? print_json(&l, err) : print_rows(&l, err);
   cJSON_Delete(l.original);
   pb_name_list_free(&l.values);
   free(l.row);

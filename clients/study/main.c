@@ -9,9 +9,7 @@
 #include "study.h"
 
 enum {
-  KEY_JSON = 0x100,
-  KEY_PLOT,
-  KEY_VALUES,
+  KEY_VALUES = 0x100,
   KEY_MODEL,
   KEY_K_F,
   KEY_K_T,
@@ -32,11 +30,6 @@ enum {
 void openblas_set_num_threads(int count) __attribute__((weak));
 
 static const struct argp_option option_table[] = {
-    {"json", KEY_JSON, NULL, 0, "Print JSON instead of tables", 1},
-    {"output-dir", 'o', "DIR", 0,
-     "Write study-….csv, study-…-frf.csv, study-…-locus.csv and study-….mat into DIR", 1},
-    {"plot", KEY_PLOT, NULL, 0,
-     "Draw the plants, root loci, RGA numbers and attainable damping (PNG) into DIR, or here", 1},
     {"values", KEY_VALUES, "LIST", 0,
      "What to study, comma-separated: numbers in SI units (axial: also inf), or names of models",
      2},
@@ -79,17 +72,6 @@ static void add_model(struct argp_state *state, const char *text, pb_name_list *
   if (grown) list->name = grown;
   if (!grown || !copy) argp_failure(state, PB_EXIT_FAILED, 0, "out of memory");
   list->name[list->count++] = copy;
-}
-
-static void read_band(struct argp_state *state, const char *text, study_options *o) {
-  double *edge;
-  size_t count;
-  pb_option_double_list(state, "--band", text, &edge, &count);
-  if (count != 2 || !(edge[0] > 0 && edge[0] < edge[1]))
-    argp_error(state, "--band: '%s' is not two ascending frequencies", text);
-  o->point.f1 = edge[0];
-  o->point.f2 = edge[1];
-  free(edge);
 }
 
 static error_t parse_number(int key, char *text, struct argp_state *state) {
@@ -149,15 +131,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
   switch (key) {
   case ARGP_KEY_INIT:
     state->child_inputs[0] = &o->common;
-    break;
-  case KEY_JSON:
-    o->json = true;
-    break;
-  case KEY_PLOT:
-    o->plot = true;
-    break;
-  case 'o':
-    o->output_dir = text;
+    state->child_inputs[1] = &o->result;
     break;
   case KEY_VALUES:
     pb_option_names(state, "--values", text, &o->values);
@@ -166,7 +140,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     add_model(state, text, &o->models);
     break;
   case KEY_BAND:
-    read_band(state, text, o);
+    pb_option_band(state, "--band", text, &o->point.f1, &o->point.f2);
     break;
   case KEY_LIVE:
     o->live = true;
@@ -180,7 +154,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     if (o->point.from >= o->point.to) argp_error(state, "--from is not below --to");
     if (!o->live && !o->plant_path) argp_error(state, "the plant file is missing");
     if (o->live && o->plant_path) argp_error(state, "--live takes the daemon's plant, no file");
-    if (o->live && (o->plot || o->output_dir))
+    if (o->live && (o->result.plot || o->result.dir))
       argp_error(state, "--live prints its report only; plantbus-identify writes files");
     break;
   default:
@@ -190,17 +164,17 @@ static error_t parse(int key, char *text, struct argp_state *state) {
 }
 
 static pb_status report(const study *s, pb_error *err) {
-  const study_options *o = s->options;
-  const char *dir = o->output_dir ? o->output_dir : ".";
+  const pb_result_options *o = &s->options->result;
   pb_status status = o->json ? study_print_json(s, err) : study_print(s, err);
-  if (!status && o->output_dir) status = study_save(s, dir, err);
-  if (!status && o->plot) status = study_plot(s, dir, err);
+  if (!status && o->dir) status = study_save(s, o->dir, err);
+  if (!status && o->plot) status = study_plot(s, pb_result_dir(o), err);
   return status;
 }
 
 static pb_status run_study(const study_options *o, pb_error *err) {
   study s = {0};
   pb_status status = study_ranks_begin(err);
+  if (!status && study_rank() == 0) status = pb_result_check(&o->result, err);
   if (!status) status = study_open(o, &s, err);
   if (!status) status = study_run(&s, err);
   if (!status && study_rank() == 0) status = report(&s, err);
@@ -209,26 +183,28 @@ static pb_status run_study(const study_options *o, pb_error *err) {
 }
 
 static int run(pb_study_kind kind, int argc, char **argv) {
-  static const struct argp_child children[] = {{&pb_common_argp, 0, "Of a running daemon:", 5},
-                                               {0}};
+  static const struct argp_child children[] = {
+      {&pb_common_argp, 0, "Of a running daemon:", 5}, {&pb_result_argp, 0, NULL, 0}, {0}};
   static const struct argp argp = {option_table, parse, "PLANT", description, children, NULL, NULL};
   study_options o = {.kind = kind,
                      .stiffness = {NAN, NAN, NAN, NAN},
                      .point = {.from = 1, .to = 1000, .points = 600},
-                     .patience = 120};
+                     .patience = 120,
+                     .result = {.files_help = "Write study-….csv, study-…-frf.csv, "
+                                              "study-…-locus.csv and study-….mat into DIR",
+                                .plot_help = "Draw the plants, root loci, RGA numbers and "
+                                             "attainable damping (PNG) into DIR, or here"}};
   pb_error err = {0};
   pb_options_parse(&argp, argc, argv, &o);
   // One thread: the workers share the cores, and a product's bits do not depend on their number.
   if (openblas_set_num_threads) openblas_set_num_threads(1);
   pb_interrupt_install();
   pb_status status = o.live ? study_live(&o, &err) : run_study(&o, &err);
-  if (!status && fflush(stdout) != 0)
-    status = pb_fail(&err, PB_ERR_IO, "output", "cannot be written");
-  if (status) pb_print_error(stderr, &err);
-  study_ranks_end(status != PB_OK);
+  const int code = pb_result_end(status, &err);
+  study_ranks_end(code != PB_EXIT_DONE);
   pb_name_list_free(&o.values);
   pb_name_list_free(&o.models);
-  return status ? PB_EXIT_FAILED : PB_EXIT_DONE;
+  return code;
 }
 
 static int bending(int argc, char **argv) {

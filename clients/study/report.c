@@ -186,5 +186,5 @@ pb_status study_print_json(const study *s, pb_error *err) {
   pb_jsonout_array_end(&j);
   pb_jsonout_object_end(&j);
   pb_jsonout_end(&j);
-  return ferror(stdout) ? pb_fail(err, PB_ERR_IO, "stdout", "the report cannot be written") : PB_OK;
+  return pb_result_flush(err);
 }

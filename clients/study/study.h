@@ -2,7 +2,7 @@
 #ifndef PB_CLIENTS_STUDY_H
 #define PB_CLIENTS_STUDY_H
 
-#include "options.h"
+#include "results.h"
 #include "study/point.h"
 #include "study/variation.h"
 
@@ -15,8 +15,7 @@ typedef struct study_options {
   pb_joint_stiffness stiffness;  // NaN: as the plant's joints have it
   pb_study_options point;
   size_t workers;  // processes on this host; 0: one a core
-  const char *output_dir;
-  bool json, plot;
+  pb_result_options result;
   bool live;  // on a running daemon
   pb_common_options common;
   double patience;  // live: seconds that a change may take

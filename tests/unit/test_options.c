@@ -1,5 +1,5 @@
 // Strict values of flags, exit codes of wrong command lines, the form of messages.
-#include "options.h"
+#include "results.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -65,7 +65,9 @@ static void test_lists(void **state) {
 
 typedef struct tool {
   pb_common_options common;
-  double gain;
+  pb_result_options result;
+  double gain, f1, f2, axis[3];
+  size_t frames[2];
 } tool;
 
 static error_t parse_tool(int key, char *arg, struct argp_state *state) {
@@ -73,6 +75,16 @@ static error_t parse_tool(int key, char *arg, struct argp_state *state) {
   switch (key) {
   case ARGP_KEY_INIT:
     state->child_inputs[0] = &t->common;
+    state->child_inputs[1] = &t->result;
+    return 0;
+  case 'b':
+    pb_option_band(state, "--band", arg, &t->f1, &t->f2);
+    return 0;
+  case 'f':
+    pb_option_frames(state, "--frames", arg, t->frames);
+    return 0;
+  case 'a':
+    pb_option_direction(state, "--axis", arg, t->axis);
     return 0;
   case 'g':
     t->gain = pb_option_double(state, "--gain", arg, 0, 100);
@@ -82,8 +94,13 @@ static error_t parse_tool(int key, char *arg, struct argp_state *state) {
   }
 }
 
-static const struct argp_option tool_option[] = {{"gain", 'g', "G", 0, "gain", 0}, {0}};
-static const struct argp_child tool_child[] = {{&pb_common_argp, 0, NULL, 0}, {0}};
+static const struct argp_option tool_option[] = {{"gain", 'g', "G", 0, "gain", 0},
+                                                 {"band", 'b', "F1,F2", 0, "band", 0},
+                                                 {"frames", 'f', "A,B", 0, "frames", 0},
+                                                 {"axis", 'a', "X,Y,Z", 0, "axis", 0},
+                                                 {0}};
+static const struct argp_child tool_child[] = {
+    {&pb_common_argp, 0, NULL, 0}, {&pb_result_argp, 0, NULL, 0}, {0}};
 static const struct argp tool_argp = {
     .options = tool_option, .parser = parse_tool, .children = tool_child};
 
@@ -134,6 +151,51 @@ static void test_command_line(void **state) {
   assert_int_equal(run_tool(unknown, &expected, text, sizeof text), PB_EXIT_USAGE);
 }
 
+// Lists of a known length name their flag and what is wanted.
+static void test_known_lists(void **state) {
+  (void)state;
+  static char *const bad[][3] = {
+      {"--band", "5", "--band: '5' is not two frequencies 0 < F1 < F2"},
+      {"--band", "0,5", "--band: '0,5' is not two"},
+      {"--band", "5,5", "--band: '5,5' is not two"},
+      {"--band", "1,nan", "--band: '1,nan' is not two"},
+      {"--band", "1,2,3", "--band: '1,2,3' is not two"},
+      {"--frames", "1,1", "--frames: '1,1' is not two different frames, counted from 1"},
+      {"--frames", "0,2", "--frames: '0,2' is not"},
+      {"--frames", "1.5,2", "--frames: '1.5,2' is not"},
+      {"--frames", "1,1e9", "--frames: '1,1e9' is not"},
+      {"--axis", "0,0,0", "--axis: '0,0,0' is not a direction X,Y,Z"},
+      {"--axis", "1,0", "--axis: '1,0' is not a direction"},
+      {"--output-dir", "", "--output-dir: the name is empty"},
+  };
+  char text[1024];
+  tool expected = {.gain = 1};
+  for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
+    char *line[] = {"tool", bad[k][0], bad[k][1], NULL};
+    assert_int_equal(run_tool(line, &expected, text, sizeof text), PB_EXIT_USAGE);
+    if (!strstr(text, bad[k][2])) fail_msg("%s: %s", bad[k][2], text);
+  }
+  char *good[] = {"tool", "--band", "1,2", "--frames=2,1", "--axis=-1,0,0", "-o", "x", NULL};
+  assert_int_equal(run_tool(good, &expected, text, sizeof text), 10);
+}
+
+// A directory that takes no files is told, and one that is not there yet is not left behind.
+static void test_result_check(void **state) {
+  (void)state;
+  char dir[] = "/tmp/pb-options-XXXXXX", path[64];
+  pb_error err = {0};
+  assert_non_null(mkdtemp(dir));
+  snprintf(path, sizeof path, "%s/new", dir);
+  const pb_result_options good = {.dir = path}, none = {0};
+  assert_int_equal(pb_result_check(&good, &err), PB_OK);
+  assert_int_equal(pb_result_check(&none, &err), PB_OK);
+  assert_int_equal(rmdir(dir), 0);
+  assert_int_equal(pb_result_check(&good, &err), PB_ERR_IO);
+  assert_string_equal(err.where, path);
+  const pb_result_options file = {.dir = "/dev/null"};
+  assert_int_equal(pb_result_check(&file, &err), PB_ERR_IO);
+}
+
 static void test_messages(void **state) {
   (void)state;
   char *text = NULL;
@@ -160,8 +222,9 @@ static void test_messages(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_double),   cmocka_unit_test(test_uint64),
-      cmocka_unit_test(test_lists),    cmocka_unit_test(test_command_line),
+      cmocka_unit_test(test_double),      cmocka_unit_test(test_uint64),
+      cmocka_unit_test(test_lists),       cmocka_unit_test(test_command_line),
+      cmocka_unit_test(test_known_lists), cmocka_unit_test(test_result_check),
       cmocka_unit_test(test_messages),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
