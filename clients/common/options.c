@@ -153,7 +153,7 @@ void pb_option_direction(const struct argp_state *state, const char *flag, const
 
 void pb_option_frames(const struct argp_state *state, const char *flag, const char *text,
                       size_t frames[2]) {
-  static const char expected[] = "two different frames, counted from 1";
+  static const char expected[] = "two frames that differ, counted from 1";
   double value[2] = {0};
   pb_option_numbers(state, flag, text, value, 2, expected);
   bool good = value[0] != value[1];

@@ -55,7 +55,7 @@ void pb_option_names(const struct argp_state *state, const char *flag, const cha
 
 // Lists of a known length: exactly `count` numbers, `expected` says in the message what they are
 // ("two positive frequencies"); a band 0 < F1 < F2 in Hz; a direction X,Y,Z, not of unit length;
-// two different frames, counted from 1.
+// two frames that differ, counted from 1.
 void pb_option_numbers(const struct argp_state *state, const char *flag, const char *text,
                        double *out, size_t count, const char *expected);
 void pb_option_band(const struct argp_state *state, const char *flag, const char *text, double *f1,

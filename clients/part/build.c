@@ -61,10 +61,16 @@ static void add_set(build_options *o, const char *pointer, const char *value,
   o->set[o->sets++] = text;
 }
 
+static const double least_density = 0.5, most_density = 6;  // of /mesh/density
+
 static void parse_densities(build_options *o, const char *arg, struct argp_state *state) {
   free(o->density);
   pb_option_double_list(state, "--convergence", arg ? arg : "0.5,0.75,1,1.5", &o->density,
                         &o->densities);
+  for (size_t i = 0; i < o->densities; i++)
+    if (!(o->density[i] >= least_density && o->density[i] <= most_density))
+      argp_error(state, "--convergence: %g is out of range, expected %g to %g", o->density[i],
+                 least_density, most_density);
 }
 
 static void check_suffix(const char *flag, const char *path, bool svg, struct argp_state *state) {
@@ -129,7 +135,7 @@ static error_t parse(int key, char *arg, struct argp_state *state) {
   build_options *o = state->input;
   switch (key) {
   case KEY_MESH:
-    pb_option_double(state, "--mesh", arg, 0.5, 6);
+    pb_option_double(state, "--mesh", arg, least_density, most_density);
     add_set(o, "/mesh/density=", arg, state);
     return 0;
   case KEY_MODES:

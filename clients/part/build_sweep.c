@@ -147,8 +147,7 @@ pb_status build_sweep(const build_options *o, pb_error *err) {
   size_t count = 0;
   pb_status st = PB_OK;
   if (!pointer) return pb_fail_memory(err, "--sweep");
-  if (!pb_parse_double_list(equal + 1, &value, &count))
-    st = pb_fail(err, PB_ERR_ARGUMENT, "--sweep", "'%s' is not a list of numbers", equal + 1);
+  if (!pb_parse_double_list(equal + 1, &value, &count)) st = pb_fail_memory(err, "--sweep");
   const char *last = strrchr(pointer, '/');
   if (!st) st = run_study(o, pointer, last[1] ? last + 1 : pointer, count, value, err);
   free(pointer);

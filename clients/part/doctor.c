@@ -25,14 +25,11 @@ static const struct argp_option option_table[] = {
 };
 
 static void parse_axis(doctor_options *o, const char *arg, struct argp_state *state) {
-  double *value = NULL, norm;
-  size_t count = 0;
-  pb_option_double_list(state, "--axis", arg, &value, &count);
-  norm = count == 3 ? sqrt(value[0] * value[0] + value[1] * value[1] + value[2] * value[2]) : 0;
-  if (!(norm > 0)) argp_error(state, "--axis: expected three numbers, not all zero");
+  double value[3];
+  pb_option_direction(state, "--axis", arg, value);
+  double norm = sqrt(value[0] * value[0] + value[1] * value[1] + value[2] * value[2]);
   for (int a = 0; a < 3; a++) o->axis[a] = value[a] / norm;
   o->has_axis = true;
-  free(value);
 }
 
 static error_t parse_option(int key, char *arg, struct argp_state *state) {

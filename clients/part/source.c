@@ -86,20 +86,12 @@ static void parse_frames(source *s, const char *text, struct argp_state *state) 
   free(value);
 }
 
-static bool is_frame(double value) {
-  return value >= 1 && value < 1e6 && value == floor(value);
-}
-
 void source_frame_pair(const char *flag, const char *arg, size_t *a, size_t *b,
                        struct argp_state *state) {
-  double *value = NULL;
-  size_t count = 0;
-  pb_option_double_list(state, flag, arg, &value, &count);
-  if (count != 2 || !is_frame(value[0]) || !is_frame(value[1]) || value[0] == value[1])
-    argp_error(state, "%s: expected two frames, as 1,2", flag);
-  *a = (size_t)value[0] - 1;
-  *b = (size_t)value[1] - 1;
-  free(value);
+  size_t frames[2];
+  pb_option_frames(state, flag, arg, frames);
+  *a = frames[0] - 1;
+  *b = frames[1] - 1;
 }
 
 static error_t parse_option(int key, char *arg, struct argp_state *state) {

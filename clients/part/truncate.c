@@ -53,15 +53,13 @@ static const struct argp_option option_table[] = {
 };
 
 static void parse_band(options *o, const char *arg, struct argp_state *state) {
-  double *value = NULL;
-  size_t count = 0;
-  pb_option_double_list(state, "--band", arg, &value, &count);
-  if (count != 2 || value[0] < 0 || value[1] <= value[0])
-    argp_error(state, "--band: expected two frequencies, as 0,1000");
-  o->truncate.low_hz = value[0];
-  o->truncate.high_hz = value[1];
+  static const char expected[] = "two frequencies 0 <= LOW < HIGH";
+  double hz[2];
+  pb_option_numbers(state, "--band", arg, hz, 2, expected);
+  if (!(hz[0] >= 0 && hz[1] > hz[0])) argp_error(state, "--band: '%s' is not %s", arg, expected);
+  o->truncate.low_hz = hz[0];
+  o->truncate.high_hz = hz[1];
   o->has_band = true;
-  free(value);
 }
 
 static void check_line(options *o, struct argp_state *state) {

@@ -121,6 +121,10 @@ static void test_messages(void **state) {
   assert_int_equal(part_run("build " JOINT " --tie loose"), 2);
   assert_int_equal(part_run("build " JOINT " --picture a.gif"), 2);
   assert_int_equal(part_run("build " JOINT " --set neck"), 2);
+  assert_int_equal(part_run("build " JOINT " --convergence=0.5,0.1"), 2);
+  part_complains("--convergence: 0.1 is out of range");
+  assert_int_equal(part_run("build " JOINT " --sweep /dimensions/neck=1e-4,x"), 2);
+  part_complains("--sweep");
   assert_int_equal(part_run("build " JOINT " --convergence -o x.mat"), 2);
   assert_int_equal(part_run("build " JOINT " --sweep /dimensions/neck=thin,thick"), 2);
   assert_int_equal(part_run("build " JOINT " --set /dimensions/nek=1"), 1);

@@ -160,7 +160,7 @@ static void test_known_lists(void **state) {
       {"--band", "5,5", "--band: '5,5' is not two"},
       {"--band", "1,nan", "--band: '1,nan' is not two"},
       {"--band", "1,2,3", "--band: '1,2,3' is not two"},
-      {"--frames", "1,1", "--frames: '1,1' is not two different frames, counted from 1"},
+      {"--frames", "1,1", "--frames: '1,1' is not two frames that differ, counted from 1"},
       {"--frames", "0,2", "--frames: '0,2' is not"},
       {"--frames", "1.5,2", "--frames: '1.5,2' is not"},
       {"--frames", "1,1e9", "--frames: '1,1e9' is not"},
