@@ -24,8 +24,8 @@ static dds_duration_t tend(pb_daemon *d) {
   pthread_mutex_unlock(&d->lock);
   pb_bus_realtime_tend(d);
   pb_configure_tend(d);
+  if (d->description_due) pb_bus_publish_description(d);  // before the event that tells of it
   pb_bus_publish_events(d);
-  if (d->description_due) pb_bus_publish_description(d);
   if (d->status_due || pb_daemon_clock() - d->status_written >= status_ns) pb_bus_publish_status(d);
   return more ? 0 : waiting ? DDS_MSECS(5) : DDS_MSECS(20);
 }

@@ -225,9 +225,9 @@ static void model_made(pb_daemon *d) {
   history_add(d, p, examined ? &report : NULL);
   model_told(d);
   char *result = model_result(d, p);
+  d->description_due = d->status_due = true;
   answer(d, "ok", &none, result ? result : "{}");
   cJSON_free(result);
-  d->description_due = d->status_due = true;
   // The change gave the old model back as part of the revision that it belonged to.
   pb_revision *old = (pb_revision *)p->job.before;
   p->job.next = NULL;  // it is the live one

@@ -237,7 +237,7 @@ bool pb_bus_answered_before(pb_daemon *daemon, const uint8_t client[16], uint64_
 void pb_request_client_name(pb_daemon *daemon, const pb_request *request, const char *said,
                             char name[PB_ENGINE_NAME]);
 
-// Answers a request.
+// Answers a request; a description that is due goes out first.
 void pb_bus_reply(pb_daemon *daemon, const uint8_t client[16], uint64_t id, const char *status,
                   const pb_error *err, const char *result);
 

@@ -55,6 +55,8 @@ void pb_bus_reply(pb_daemon *d, const uint8_t client[16], uint64_t id, const cha
                           .message = (char *)err->message,
                           .result = (char *)result};
   memcpy(reply.client, client, sizeof reply.client);
+  // Who has the answer and looks for the plant then finds what it tells of.
+  if (d->description_due) pb_bus_publish_description(d);
   dds_write(d->reply, &reply);
 }
 

@@ -14,16 +14,17 @@ typedef struct block_run {
   double *command;    // [inputs]
   uint64_t sent;      // commands of this round
   uint32_t steps;     // of a block
-  uint32_t revision;  // of the first block
+  uint32_t revision;  // of the session's model
 } block_run;
 
 // Rows of a block as samples to the callback; *more is false once it has had enough.
 static pb_status rows_take(block_run *r, const pb_block *block, bool *more, pb_error *err) {
   pb_experiment *e = r->experiment;
   if (block->input_count != e->model->nu || block->output_count != e->model->ny ||
-      (r->revision && block->revision != r->revision))
-    return pb_fail(err, PB_ERR_STATE, "block", "the plant's model was changed");
-  r->revision = block->revision;
+      block->revision != r->revision)
+    return pb_fail(err, PB_ERR_STATE, "block",
+                   "the plant's model was changed: revision %u became %u", r->revision,
+                   block->revision);
   for (uint32_t row = 0; row < block->steps && *more; row++) {
     const pb_sample sample = {
         .step = block->step + 1 + row,
@@ -92,7 +93,8 @@ pb_status pb_experiment_run_blocks(pb_experiment *e, pb_session *session, uint32
                  .input = malloc(inputs * sizeof *r.input),
                  .values = malloc(steps * inputs * sizeof *r.values),
                  .command = malloc(inputs * sizeof *r.command),
-                 .steps = steps};
+                 .steps = steps,
+                 .revision = pb_session_description(session)->revision};
   const double begin = pb_experiment_seconds();
   if (!r.input || !r.values || !r.command) status = pb_fail_memory(err, "blocks");
   for (size_t i = 0; status == PB_OK && i < inputs; i++)

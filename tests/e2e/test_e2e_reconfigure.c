@@ -304,6 +304,19 @@ static void joints_become_elements_and_back(void **state) {
   e2e_daemon_end(&daemon);
 }
 
+// Who has the answer and looks for the plant anew finds the revision that it tells of.
+static void the_description_comes_before_the_answer(void **state) {
+  (void)state;
+  e2e_daemon daemon = e2e_daemon_start(PB_CONFIG "/plants/nano-hexapod.json", NULL);
+  for (uint32_t revision = 2; revision < 12; revision++) {
+    pb_session *session = e2e_open(&daemon);
+    assert_int_equal(pb_session_description(session)->revision, revision - 1);
+    e2e_request(session, "configure", "{\"patch\": {}}");
+    pb_session_close(session);
+  }
+  e2e_daemon_end(&daemon);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_patch_makes_a_revision),
@@ -314,6 +327,7 @@ int main(void) {
       cmocka_unit_test(a_run_never_mixes_revisions),
       cmocka_unit_test(identify_never_averages_across_revisions),
       cmocka_unit_test(real_time_goes_on_with_another_model),
+      cmocka_unit_test(the_description_comes_before_the_answer),
       cmocka_unit_test_setup_teardown(joints_become_elements_and_back, element_make,
                                       element_remove),
   };
