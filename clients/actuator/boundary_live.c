@@ -7,34 +7,24 @@
 #include "boundary.h"
 #include "interrupt.h"
 #include "plant/boundary.h"
-#include "session.h"
+#include "session_change.h"
 
 static const double patience = 60;  // seconds for a model to be compiled and swapped in
 
-// Sends a request that makes a revision and waits until it acts.
-static pb_status reconfigure(const boundary_options *o, const char *kind, const cJSON *body,
-                             pb_error *err) {
-  const pb_session_options options = {.domain = o->subject.live.common.domain,
-                                      .plant = o->subject.live.common.plant};
+static pb_session_options session_of(const boundary_options *o) {
+  const pb_common_options *common = &o->subject.live.common;
+  return (pb_session_options){.domain = common->domain, .plant = common->plant};
+}
+
+static pb_status configure(const boundary_options *o, const cJSON *body, pb_error *err) {
+  const pb_session_options options = session_of(o);
+  const pb_change_options wait = {patience, patience, pb_interrupted};
   pb_session *session = NULL;
-  pb_session_event event;
-  pb_answer answer = {0};
-  cJSON *result = NULL;
-  char *text = NULL;
-  pb_status st = pb_json_print_compact(body, &text, err);
-  if (!st) st = pb_session_open(&options, &session, err);
-  if (!st) st = pb_session_ask(session, kind, text, patience, &answer, err);
-  if (!st) st = pb_json_parse(answer.result, strlen(answer.result), &result, err);
-  if (!st && !cJSON_IsTrue(pb_json_member(result, "swapped"))) {
-    st = pb_session_wait_event(session, "reconfigured configure_failed shutdown", answer.event,
-                               patience, NULL, &event, err);
-    if (!st && strcmp(event.kind, "reconfigured"))
-      st = pb_fail(err, PB_ERR_STATE, event.kind, "%s", event.message);
-  }
-  cJSON_Delete(result);
-  pb_answer_clear(&answer);
+  pb_change change = {0};
+  pb_status st = pb_session_open(&options, &session, err);
+  if (!st) st = pb_session_change(session, "configure", body, &wait, &change, err);
+  pb_change_clear(&change);
   pb_session_close(session);
-  free(text);
   return st;
 }
 
@@ -46,7 +36,7 @@ static pb_status switch_to(const boundary_options *o, const char *model, const p
   cJSON *boundary = boundary_patch(b);
   pb_status st = PB_OK;
   if (models && boundary && cJSON_AddItemToObject(models, model, boundary)) {
-    st = reconfigure(o, "configure", body, err);
+    st = configure(o, body, err);
   } else {
     cJSON_Delete(boundary);
     st = pb_fail_memory(err, "boundary");
@@ -55,20 +45,10 @@ static pb_status switch_to(const boundary_options *o, const char *model, const p
   return st;
 }
 
-static pb_status put_back(const boundary_options *o, uint32_t revision, pb_error *err) {
-  cJSON *body = cJSON_CreateObject();
-  pb_status st = body && cJSON_AddNumberToObject(body, "revision", (double)revision)
-                     ? reconfigure(o, "revert", body, err)
-                     : pb_fail_memory(err, "revert");
-  cJSON_Delete(body);
-  return st;
-}
-
 // What is served: the actuator's model, its revision.
 static pb_status find_model(const boundary_options *o, pb_element_source *source,
                             uint32_t *revision, boundary_result *r, pb_error *err) {
-  const pb_session_options options = {.domain = o->subject.live.common.domain,
-                                      .plant = o->subject.live.common.plant};
+  const pb_session_options options = session_of(o);
   pb_session *session = NULL;
   pb_status st = pb_session_open(&options, &session, err);
   if (st) return st;
@@ -112,7 +92,8 @@ pb_status boundary_live(const boundary_options *o, boundary_result *r, pb_error 
     if (!st && pb_interrupted()) st = pb_fail(err, PB_ERR_STATE, "boundary", "interrupted");
   }
   pb_error second = {0};
-  const pb_status back = put_back(o, revision, &second);
+  const pb_session_options options = session_of(o);
+  const pb_status back = pb_session_give_back(&options, revision, patience, &second);
   pb_element_source_clear(&source);
   if (st || !back) return st;
   return pb_fail(err, back, second.where, "the boundary that was found is not put back: %.300s",

@@ -5,9 +5,9 @@ set(PB_SESSION_SOURCES
   session.c
   session_attach.c
   session_bus.c
-  session_event.c
-
   session_block.c
+  session_change.c
+  session_event.c
   session_find.c
   session_request.c
   session_run.c

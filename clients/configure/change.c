@@ -10,6 +10,7 @@
 #include "jsontext.h"
 #include "patch.h"
 #include "plant/plant.h"
+#include "session_change.h"
 
 // ---- dry run ------------------------------------------------------------------------------------
 
@@ -82,46 +83,35 @@ static void print_result(const cJSON *result) {
 }
 
 // The event's word, and from the history what the reply could not know yet.
-static pb_status swap_wait(const configure_options *o, pb_session *session, const pb_answer *answer,
-                           cJSON *result, pb_error *err) {
-  pb_session_event event;
+static pb_status add_swap(const configure_options *o, pb_session *session, pb_change *change,
+                          pb_error *err) {
   cJSON *entry = NULL;
-  const cJSON *revision = pb_json_member(result, "revision");
-  pb_status status = pb_session_wait_event(session, "reconfigured configure_failed shutdown",
-                                           answer->event, o->wait, pb_interrupted, &event, err);
-  if (!status && strcmp(event.kind, "reconfigured") != 0)
-    status = pb_fail(err, PB_ERR_STATE, event.kind, "%s", event.message);
-  if (!status && (!cJSON_AddStringToObject(result, "message", event.message) ||
-                  !cJSON_AddNumberToObject(result, "step", (double)event.step)))
+  const cJSON *revision = pb_json_member(change->result, "revision");
+  pb_status status = PB_OK;
+  if (!cJSON_AddStringToObject(change->result, "message", change->event.message) ||
+      !cJSON_AddNumberToObject(change->result, "step", (double)change->event.step))
     status = pb_fail_memory(err, "result");
   if (!status)
     status = history_entry(o, session, cJSON_IsNumber(revision) ? revision->valuedouble : 0.0,
                            &entry, err);
-  if (!status) status = fill_up(result, entry, err);
+  if (!status) status = fill_up(change->result, entry, err);
   cJSON_Delete(entry);
   return status;
 }
 
 static pb_status ask(const configure_options *o, pb_session *session, const char *kind,
                      const cJSON *body, pb_error *err) {
-  char *text = NULL;
-  cJSON *result = NULL;
-  pb_answer answer = {0};
-  const double patience = o->timeout > o->wait ? o->timeout : o->wait;  // it may compile first
-  pb_status status = pb_json_print_compact(body, &text, err);
-  if (!status) status = pb_session_ask(session, kind, text, patience, &answer, err);
-  if (!status) status = pb_json_parse(answer.result, strlen(answer.result), &result, err);
-  if (!status && !cJSON_IsObject(result))
-    status = pb_fail(err, PB_ERR_SYNTAX, kind, "the daemon's answer is not an object");
-  if (!status && !cJSON_IsTrue(pb_json_member(result, "swapped")))
-    status = swap_wait(o, session, &answer, result, err);
+  const pb_change_options options = {.timeout = o->timeout > o->wait ? o->timeout : o->wait,
+                                     .wait = o->wait,
+                                     .interrupted = pb_interrupted};
+  pb_change change = {0};
+  pb_status status = pb_session_change(session, kind, body, &options, &change, err);
+  if (!status && change.event.kind[0]) status = add_swap(o, session, &change, err);
   if (!status && o->json)
-    status = pb_json_show(result, stdout, err);
+    status = pb_json_show(change.result, stdout, err);
   else if (!status)
-    print_result(result);
-  cJSON_Delete(result);
-  pb_answer_clear(&answer);
-  free(text);
+    print_result(change.result);
+  pb_change_clear(&change);
   return status;
 }
 

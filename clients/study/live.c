@@ -11,6 +11,7 @@
 #include "interrupt.h"
 #include "jsonout.h"
 #include "patch.h"
+#include "session_change.h"
 #include "study.h"
 #include "table.h"
 
@@ -27,39 +28,21 @@ typedef struct live {
   const study_options *options;
   cJSON *original;    // the plant file that the daemon had
   uint32_t revision;  // its number
-  bool changed;
+  bool asked;         // for a change of it
   pb_name_list values;
   live_row *row;  // [values.count]
 } live;
 
 // ---- changing the plant -------------------------------------------------------------------------
 
-static pb_status open_session(const live *l, pb_session **out, pb_error *err) {
-  const pb_session_options options = {.domain = l->options->common.domain,
-                                      .plant = l->options->common.plant};
-  return pb_session_open(&options, out, err);
+static pb_session_options session_of(const live *l) {
+  return (pb_session_options){.domain = l->options->common.domain,
+                              .plant = l->options->common.plant};
 }
 
-// Sends a request that compiles and waits until it acts; an answer "swapped" has acted already.
-static pb_status request_change(const live *l, pb_session *session, const char *kind,
-                                const cJSON *body, pb_error *err) {
-  char *text = NULL;
-  cJSON *result = NULL;
-  pb_answer answer = {0};
-  pb_session_event event;
-  pb_status status = pb_json_print_compact(body, &text, err);
-  if (!status) status = pb_session_ask(session, kind, text, l->options->patience, &answer, err);
-  if (!status) status = pb_json_parse(answer.result, strlen(answer.result), &result, err);
-  if (!status && !cJSON_IsTrue(pb_json_member(result, "swapped"))) {
-    status = pb_session_wait_event(session, "reconfigured configure_failed shutdown", answer.event,
-                                   l->options->patience, pb_interrupted, &event, err);
-    if (!status && strcmp(event.kind, "reconfigured"))
-      status = pb_fail(err, PB_ERR_STATE, event.kind, "%s", event.message);
-  }
-  cJSON_Delete(result);
-  pb_answer_clear(&answer);
-  free(text);
-  return status;
+static pb_status open_session(const live *l, pb_session **out, pb_error *err) {
+  const pb_session_options options = session_of(l);
+  return pb_session_open(&options, out, err);
 }
 
 // Moves what makes document's member `key` into that of target, as far as it differs, into patch.
@@ -81,6 +64,8 @@ static pb_status add_difference(const cJSON *document, const cJSON *target, cons
 static pb_status send_value(const live *l, pb_session *session, const char *value, pb_error *err) {
   const char *text = pb_session_description(session)->plant_text;
   const pb_variation v = {l->options->kind, value, l->options->stiffness, NULL};
+  const pb_change_options wait = {l->options->patience, l->options->patience, pb_interrupted};
+  pb_change change = {0};
   cJSON *now = NULL, *target = NULL, *body = cJSON_CreateObject();
   cJSON *patch = cJSON_AddObjectToObject(body, "patch");
   cJSON_AddStringToObject(body, "name", "plantbus-study");
@@ -90,7 +75,8 @@ static pb_status send_value(const live *l, pb_session *session, const char *valu
   if (!status && l->options->models.count > 0)
     status = add_difference(now, target, "models", patch, err);
   if (!status) status = add_difference(now, target, "template", patch, err);
-  if (!status) status = request_change(l, session, "configure", body, err);
+  if (!status) status = pb_session_change(session, "configure", body, &wait, &change, err);
+  pb_change_clear(&change);
   cJSON_Delete(body);
   cJSON_Delete(target);
   cJSON_Delete(now);
@@ -100,23 +86,19 @@ static pb_status send_value(const live *l, pb_session *session, const char *valu
 static pb_status change_to(live *l, const char *value, pb_error *err) {
   pb_session *session = NULL;
   pb_status status = open_session(l, &session, err);
+  l->asked = l->asked || !status;
   if (!status) status = send_value(l, session, value, err);
-  l->changed = l->changed || !status;
   pb_session_close(session);
   return status;
 }
 
-// The first error is the one that counts.
-static pb_status give_back(live *l, pb_status before, pb_error *err) {
-  pb_session *session = NULL;
+// The first error is the one that counts. A change that was asked for may still come, also where
+// the wait for it was broken off.
+static pb_status give_back(const live *l, pb_status before, pb_error *err) {
+  const pb_session_options options = session_of(l);
   pb_error own;
-  if (!l->changed) return before;
-  cJSON *body = cJSON_CreateObject();
-  cJSON_AddNumberToObject(body, "revision", l->revision);
-  pb_status status = open_session(l, &session, &own);
-  if (!status) status = request_change(l, session, "revert", body, &own);
-  pb_session_close(session);
-  cJSON_Delete(body);
+  if (!l->asked) return before;
+  pb_status status = pb_session_give_back(&options, l->revision, l->options->patience, &own);
   if (!status || before) return before;
   return pb_fail(err, status, own.where, "the daemon did not get its plant back: %s", own.message);
 }
