@@ -2,10 +2,11 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
+#include "alike.h"
 #include "frf_files.h"
 #include "plot.h"
-#include "study.h"
 
 enum { N = PB_STUDY_STRUTS };
 
@@ -26,7 +27,8 @@ static pb_status path_of(const study *s, const char *dir, const char *what, char
 
 // Labels and work space of a figure with a curve a value.
 typedef struct canvas {
-  char (*label)[80];     // [count]
+  study_label *label;    // [count]
+  size_t *shown;         // [count] values that have curves of their own
   double complex *h;     // responses
   double *x, *y;         // points of curves
   pb_bode_curve *bode;   // [count]
@@ -35,6 +37,7 @@ typedef struct canvas {
 
 static void canvas_clear(canvas *c) {
   free(c->label);
+  free(c->shown);
   free(c->h);
   free(c->x);
   free(c->y);
@@ -46,12 +49,13 @@ static pb_status canvas_make(const study *s, size_t responses, size_t points, si
                              canvas *c, pb_error *err) {
   *c = (canvas){0};
   c->label = malloc((s->count + 1) * sizeof *c->label);
+  c->shown = malloc((s->count + 1) * sizeof *c->shown);
   c->h = malloc((responses + 1) * sizeof *c->h);
   c->x = malloc((points + 1) * sizeof *c->x);
   c->y = malloc((points + 1) * sizeof *c->y);
   c->bode = calloc(s->count + 1, sizeof *c->bode);
   c->curve = calloc(curves + 1, sizeof *c->curve);
-  if (!c->label || !c->h || !c->x || !c->y || !c->bode || !c->curve) {
+  if (!c->label || !c->shown || !c->h || !c->x || !c->y || !c->bode || !c->curve) {
     canvas_clear(c);
     return pb_fail_memory(err, "plot");
   }
@@ -82,12 +86,14 @@ static pb_status plot_response(const study *s, bool hac, const char *dir, pb_err
   if (!status) status = canvas_make(s, lines_of(s), 0, 0, &c, err);
   if (status) return status;
   double complex *h = c.h;
-  for (size_t k = 0; k < s->count; k++) {
+  const size_t count = study_alike(s, hac ? study_hac_alike : study_iff_alike, c.label, c.shown);
+  for (size_t j = 0; j < count; j++) {
+    const size_t k = c.shown[j];
     const pb_study_point *p = &s->point[k];
     const double complex *from = hac ? p->hac : p->iff;
     double scale = absolute ? 1 : 1 / cabs(from[0]);
     for (size_t f = 0; f < p->size.lines; f++) h[f] = scale * from[f * N * N];
-    c.bode[k] =
+    c.bode[j] =
         (pb_bode_curve){c.label[k], PB_PLOT_LINE, (int)k + 1, p->size.lines, p->hz, h, NULL};
     h += p->size.lines;
   }
@@ -99,7 +105,7 @@ static pb_status plot_response(const study *s, bool hac, const char *dir, pb_err
                       : "force sensor 1");
   pb_bode_plot plot = {.title = title,
                        .unit = absolute ? unit : "over its lowest-frequency value",
-                       .count = s->count,
+                       .count = count,
                        .curve = c.bode};
   status = pb_plot_bode(path, &plot, err);
   canvas_clear(&c);
@@ -156,7 +162,8 @@ static pb_status plot_locus(const study *s, const char *dir, pb_error *err) {
   if (!status) status = canvas_make(s, 0, points, curves, &c, err);
   if (status) return status;
   points = curves = 0;
-  for (size_t k = 0; k < s->count; k++) draw_locus(s, k, &c, &curves, &points);
+  const size_t count = study_alike(s, study_iff_alike, c.label, c.shown);
+  for (size_t j = 0; j < count; j++) draw_locus(s, c.shown[j], &c, &curves, &points);
   const double top = 1.15 * 2 * M_PI * highest;
   snprintf(title, sizeof title, "%s: IFF root loci; × poles, ○ zeros, + best gain", s->plant);
   pb_plot_panel panel = {.x = {"Real part (rad/s)", false, -top, 0.05 * top, 0},
@@ -177,18 +184,20 @@ static pb_status plot_rga(const study *s, const char *dir, pb_error *err) {
   pb_status status = path_of(s, dir, "rga", path, sizeof path, err);
   if (!status) status = canvas_make(s, 0, 0, 2 * s->count, &c, err);
   if (status) return status;
-  for (size_t k = 0; k < s->count; k++) {
+  const size_t count = study_alike(s, study_rga_alike, c.label, c.shown);
+  for (size_t j = 0; j < count; j++) {
+    const size_t k = c.shown[j];
     const pb_study_point *p = &s->point[k];
-    c.curve[2 * k] =
+    c.curve[2 * j] =
         (pb_plot_curve){NULL, PB_PLOT_THIN, (int)k + 1, p->size.lines, p->hz, p->rga_open};
-    c.curve[2 * k + 1] =
+    c.curve[2 * j + 1] =
         (pb_plot_curve){c.label[k], PB_PLOT_LINE, (int)k + 1, p->size.lines, p->hz, p->rga};
   }
   snprintf(title, sizeof title, "%s: RGA number of the HAC plant, undamped (thin) and with IFF",
            s->plant);
   pb_plot_panel panel = {.x = {.label = "Frequency (Hz)", .log = true},
                          .y = {.label = "RGA number", .log = true},
-                         .count = 2 * s->count,
+                         .count = 2 * count,
                          .curve = c.curve};
   pb_plot_figure figure = {.title = title, .count = 1, .panel = &panel};
   status = pb_plot(path, &figure, err);
@@ -199,7 +208,7 @@ static pb_status plot_rga(const study *s, const char *dir, pb_error *err) {
 // A curve a mode over the finite values; on a logarithmic axis those above zero.
 static pb_status plot_damping(const study *s, const char *dir, pb_error *err) {
   const pb_study_kind_facts *facts = pb_study_kind_of(s->options->kind);
-  char path[1024], title[256], axis[64], name[N][16];
+  char path[1024], title[256], axis[64], name[N][64];
   canvas c;
   double least = INFINITY, most = 0;
   size_t finite = 0;
@@ -214,22 +223,33 @@ static pb_status plot_damping(const study *s, const char *dir, pb_error *err) {
   pb_status status = path_of(s, dir, "damping", path, sizeof path, err);
   if (!status) status = canvas_make(s, 0, N * s->count, N, &c, err);
   if (status) return status;
+  size_t curves = 0;
   for (size_t m = 0; m < N; m++) {
     double *x = c.x + m * s->count, *y = c.y + m * s->count;
+    bool any = false;
     for (size_t k = 0; k < s->count; k++) {
       const pb_study_point *p = &s->point[k];
       bool there = isfinite(s->value[k]) && (!log || s->value[k] > 0) && m < p->size.modes;
       x[k] = there ? s->value[k] : NAN;
       y[k] = there ? 100 * p->attainable[m] : NAN;
+      any = any || there;
     }
-    snprintf(name[m], sizeof name[m], "mode %zu", m + 1);
-    c.curve[m] = (pb_plot_curve){name[m], PB_PLOT_LINE, (int)m + 1, s->count, x, y};
+    size_t j = 0;
+    while (j < curves && !study_same(c.curve[j].y, y, s->count)) j++;
+    if (j < curves) {
+      const size_t length = strlen(name[j]);
+      snprintf(name[j] + length, sizeof name[j] - length, ", %zu", m + 1);
+    } else if (any) {
+      snprintf(name[curves], sizeof name[0], "mode %zu", m + 1);
+      c.curve[curves] = (pb_plot_curve){name[curves], PB_PLOT_LINE, (int)m + 1, s->count, x, y};
+      curves++;
+    }
   }
   snprintf(axis, sizeof axis, "%s (%s)", facts->quantity, facts->unit);
   snprintf(title, sizeof title, "%s: attainable damping with IFF", s->plant);
   pb_plot_panel panel = {.x = {.label = axis, .log = log},
                          .y = {.label = "Attainable damping (%)", .min = 0, .max = 105},
-                         .count = N,
+                         .count = curves,
                          .curve = c.curve};
   pb_plot_figure figure = {.title = title, .count = 1, .panel = &panel};
   status = pb_plot(path, &figure, err);

@@ -1,6 +1,7 @@
 // What a study says: tables or JSON on stdout.
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "jsonout.h"
 #include "study.h"
@@ -117,8 +118,10 @@ static pb_status print_struts(const study *s, pb_error *err) {
 pb_status study_print(const study *s, pb_error *err) {
   const pb_study_point *p = &s->point[0];
   printf("%s: %s, %zu plants\n", s->plant, pb_study_kind_of(s->options->kind)->name, s->count);
-  printf("HAC plant %s → dL1, IFF plant %s → %s, %g Hz\n", p->input, p->input, p->sensor,
-         p->sample_rate);
+  bool same = true;
+  for (size_t k = 1; k < s->count; k++) same = same && !strcmp(s->point[k].input, p->input);
+  printf("HAC plant %s → dL1, IFF plant %s → %s, %g Hz\n", same ? p->input : "actuator 1",
+         same ? p->input : "actuator 1", same ? p->sensor : "force sensor 1", p->sample_rate);
   pb_status status = print_plants(s, err);
   if (!status) status = print_damping(s, err);
   if (!status) status = print_gains(s, err);
