@@ -214,7 +214,7 @@ static pb_status plot(const fit_options *o, const fit_result *r, const response 
     snprintf(file, sizeof file, "fit-%s.png", output_keys[k]);
     snprintf(title, sizeof title, "%s: %s", r->subject, output_names[k]);
     const pb_bode_curve curve[2] = {
-        {exact ? "element" : "measured", exact ? PB_PLOT_LINE : PB_PLOT_POINTS, 1, frf->nf,
+        {exact ? "exact" : "measured", exact ? PB_PLOT_LINE : PB_PLOT_POINTS, 1, frf->nf,
          frf->frequency_hz, list[2 * k].h, NULL},
         {"2-DoF model", PB_PLOT_DASHED, PB_PLOT_BLACK, frf->nf, frf->frequency_hz,
          list[2 * k + 1].h, NULL},

@@ -65,13 +65,18 @@ static void print_number(const cJSON *result, const char *key, const char *label
     printf("%-16s %.6g%s%s\n", label, item->valuedouble, unit[0] ? " " : "", unit);
 }
 
+static void print_count(const cJSON *result, const char *key, const char *label) {
+  const cJSON *item = pb_json_member(result, key);
+  if (cJSON_IsNumber(item)) printf("%-16s %.0f\n", label, item->valuedouble);
+}
+
 static void print_result(const cJSON *result) {
   const cJSON *jump = pb_json_member(result, "output_jump");
   const cJSON *worst = pb_json_member(result, "worst_output");
   const cJSON *message = pb_json_member(result, "message");
-  print_number(result, "revision", "revision", "");
-  print_number(result, "step", "at step", "");
-  print_number(result, "states", "states", "");
+  print_count(result, "revision", "revision");
+  print_count(result, "step", "at step");
+  print_count(result, "states", "states");
   print_number(result, "compile_seconds", "compiled in", "s");
   if (cJSON_IsNumber(jump) && cJSON_IsString(worst))
     printf("%-16s %.6g (%s)\n", "output jump", jump->valuedouble, worst->valuestring);

@@ -10,7 +10,8 @@ static bool shown(const control_design *d, int stage) {
 
 static void print_shape(const control_design *d) {
   const pb_hac_shape *s = &d->shape;
-  printf("HAC, %s frame, %zu loops: K = k", d->frame.cartesian ? "Cartesian" : "strut", d->n);
+  printf("HAC, %s frame, %zu loop%s: K = k", d->frame.cartesian ? "Cartesian" : "strut", d->n,
+         d->n == 1 ? "" : "s");
   if (s->integrator_hz > 0) printf(" · (s + 2π·%g)/s", s->integrator_hz);
   if (s->lead > 1) {
     double root = sqrt(s->lead);
@@ -31,9 +32,9 @@ void control_print_design(const control_design *d) {
   }
   if (d->damped) {
     const pb_iff *iff = &d->iff.law;
-    printf("IFF, %zu loops: K = %.6g/(s + 2π·%g) · s/(s + 2π·%g)%s, delay %u\n", d->n, iff->gain,
-           iff->integrator_hz, iff->highpass_hz, d->iff.searched ? " (best gain)" : "",
-           d->iff_delay);
+    printf("IFF, %zu loop%s: K = %.6g/(s + 2π·%g) · s/(s + 2π·%g)%s, delay %u\n", d->n,
+           d->n == 1 ? "" : "s", iff->gain, iff->integrator_hz, iff->highpass_hz,
+           d->iff.searched ? " (best gain)" : "", d->iff_delay);
   }
   print_shape(d);
   const control_frame *f = &d->frame;

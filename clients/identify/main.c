@@ -7,6 +7,7 @@
 
 #include "identify.h"
 #include "interrupt.h"
+#include "outfile.h"
 
 enum {
   KEY_INPUT = 0x100,
@@ -158,35 +159,26 @@ static pb_status run_rounds(const identify_options *o, pb_bench *bench, pb_exper
   }
 }
 
-static pb_status open_samples(const char *path, FILE **stream, pb_error *err) {
-  *stream = NULL;
-  if (!path) return PB_OK;
-  *stream = fopen(path, "wb");
-  return *stream ? PB_OK : pb_fail(err, PB_ERR_IO, path, "the file cannot be written");
-}
-
-static pb_status close_samples(const char *path, FILE *stream, pb_status status, pb_error *err) {
-  if (!stream) return status;
-  bool failed = ferror(stream) != 0;
-  failed = fclose(stream) != 0 || failed;
-  if (failed && status == PB_OK)
-    return pb_fail(err, PB_ERR_IO, path, "the samples are not complete");
+// Whole or not at all: what a broken-off experiment leaves is no record.
+static pb_status close_samples(pb_outfile *samples, pb_status status, pb_error *err) {
+  if (status == PB_OK && samples->stream) return pb_outfile_close(samples, err);
+  pb_outfile_discard(samples);
   return status;
 }
 
 static pb_status measure(const identify_options *o, pb_bench *bench,
                          const pb_experiment_channels *channels, identify_result *result,
                          pb_experiment **experiment, pb_error *err) {
-  FILE *samples = NULL;
+  pb_outfile samples = {0};
   pb_frf frf = {0};
   pb_status status = fill_defaults(o, bench, &result->experiment, err);
   if (status == PB_OK) {
     status = pb_experiment_new(bench->model, channels, NULL, &result->experiment, bench->realtime,
                                experiment, err);
   }
-  if (status == PB_OK) status = open_samples(o->samples, &samples, err);
+  if (status == PB_OK && o->samples) status = pb_outfile_open(o->samples, &samples, err);
   if (status == PB_OK) {
-    pb_experiment_save_to(*experiment, samples);
+    pb_experiment_save_to(*experiment, samples.stream);
     status = pb_experiment_begin(*experiment, err);
   }
   // Between rounds it estimates and draws new signals while lockstep waits.
@@ -196,7 +188,7 @@ static pb_status measure(const identify_options *o, pb_bench *bench,
   }
   if (status == PB_OK) status = run_rounds(o, bench, *experiment, result, &frf, err);
   pb_bench_detach(bench);
-  status = close_samples(o->samples, samples, status, err);
+  status = close_samples(&samples, status, err);
   if (status == PB_OK) {
     double floor = result->experiment.excitation == PB_EXCITE_NOISE ? 1e-3 : 1e-6;
     status = pb_analyse(bench->model, channels, &frf, floor, &result->analysis, err);

@@ -73,7 +73,7 @@ static pb_status list_modes(iff_result *r, pb_error *err) {
   }
   qsort(r->mode, r->modes, sizeof *r->mode, by_open_frequency);
   if (r->modes > 0) return PB_OK;
-  return pb_fail(err, PB_ERR_STATE, "band", "the plant has no mode within %g … %g Hz",
+  return pb_fail(err, PB_ERR_STATE, "--band", "the plant has no mode within %g … %g Hz",
                  r->experiment.f1, r->experiment.f2);
 }
 

@@ -14,7 +14,7 @@ void iff_loops_clear(iff_loops *loops) {
 static pb_status by_names(const pb_model *model, const iff_options *o, iff_loops *out,
                           pb_error *err) {
   if (o->inputs.count != o->outputs.count) {
-    return pb_fail(err, PB_ERR_ARGUMENT, "loops", "%zu inputs and %zu outputs do not pair",
+    return pb_fail(err, PB_ERR_ARGUMENT, "--input", "%zu inputs and %zu outputs do not pair",
                    o->inputs.count, o->outputs.count);
   }
   size_t outputs = 0;

@@ -23,7 +23,7 @@ static void print_head(const iff_result *r) {
          r->loop.sign);
   printf("%zu loop%s:", r->loops.count, r->loops.count == 1 ? "" : "s");
   for (size_t k = 0; k < r->loops.count; k++) {
-    printf(" %s → %s", r->model->output[r->loops.output[k]].name,
+    printf("%s %s → %s", k ? "," : "", r->model->output[r->loops.output[k]].name,
            r->model->input[r->loops.input[k]].name);
   }
   printf("\n");

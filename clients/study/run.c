@@ -26,10 +26,15 @@ pb_status study_add_model(cJSON *file, const char *text, pb_error *err) {
   cJSON *models = cJSON_GetObjectItemCaseSensitive(file, "models"), *model = NULL;
   if (!equals || equals == text)
     return pb_fail(err, PB_ERR_ARGUMENT, "--model", "'%s' is not NAME=JSON or NAME=@FILE", text);
+  pb_error inner = {0};
   char *name = strndup(text, (size_t)(equals - text));
-  pb_status status = name ? pb_json_argument(equals + 1, &model, err) : pb_fail_memory(err, text);
+  pb_status status =
+      name ? pb_json_argument(equals + 1, &model, &inner) : pb_fail_memory(&inner, "argument");
+  if (status)
+    pb_fail(err, status, "--model", "%.80s: %.80s: %.280s", name ? name : text, inner.where,
+            inner.message);
   if (!status && !cJSON_IsObject(model))
-    status = pb_fail(err, PB_ERR_SYNTAX, name, "a model is a JSON object");
+    status = pb_fail(err, PB_ERR_SYNTAX, "--model", "%.80s: a model is a JSON object", name);
   if (!status && !models) models = cJSON_AddObjectToObject(file, "models");
   if (!status) cJSON_DeleteItemFromObjectCaseSensitive(models, name);
   if (!status && cJSON_AddItemToObject(models, name, model))
@@ -174,8 +179,10 @@ static pb_status collect(void *context, study_message *m, pb_error *err) {
   void *bytes;
   size_t size;
   pb_status status = study_message_pack(m, &bytes, &size, err);
-  if (!status) status = study_ranks_send(bytes, size, err);
-  if (!status) free(bytes);
+  if (!status) {
+    status = study_ranks_send(bytes, size, err);
+    free(bytes);
+  }
   pb_study_point_clear(&m->point);
   return status;
 }
