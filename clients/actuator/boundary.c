@@ -230,7 +230,8 @@ int command_boundary(int argc, char **argv) {
   subject_defaults(&o.subject);
   pb_options_parse(&argp, argc, argv, &o);
   pb_interrupt_install();
-  pb_status st = o.subject.live.live ? boundary_live(&o, &r, &err) : from_file(&o, &r, &err);
+  pb_status st = pb_result_check(&o.subject.result, &err);
+  if (!st) st = o.subject.live.live ? boundary_live(&o, &r, &err) : from_file(&o, &r, &err);
   if (!st) st = boundary_present(&o, &r, &err);
   for (size_t i = 0; i < r.count; i++) free(r.row[i].response);
   free(r.row);

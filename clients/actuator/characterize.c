@@ -71,31 +71,37 @@ static void split_sheet(const char *text, char *file, size_t size, const char **
   *name = json[5] == ':' ? json + 6 : NULL;
 }
 
-static pb_status put_sheet(const characterize_options *o, characterize_result *r, pb_error *err) {
-  char path[1024], where[300];
+// The sheet that --datasheet names, in *file (cJSON_Delete); NULL: none is asked for.
+static pb_status find_sheet(const characterize_options *o, cJSON **file, const cJSON **sheet,
+                            pb_error *err) {
+  char path[1024];
   const char *name;
-  cJSON *file = NULL;
-  const cJSON *sheets = NULL, *sheet = NULL;
-  r->sheet_stiffness = NAN;
+  const cJSON *sheets = NULL;
+  *file = NULL;
+  *sheet = NULL;
   if (!o->datasheet) return PB_OK;
   split_sheet(o->datasheet, path, sizeof path, &name);
-  pb_status st = pb_shipped_sheets(path[0] ? path : NULL, actuator_quantities, &file, &sheets, err);
+  pb_status st = pb_shipped_sheets(path[0] ? path : NULL, actuator_quantities, file, &sheets, err);
   if (!st && !name && cJSON_GetArraySize(sheets) == 1) name = sheets->child->string;
-  if (!st && name) sheet = pb_json_member(sheets, name);
-  if (!st && !sheet)
+  if (!st && name) *sheet = pb_json_member(sheets, name);
+  if (!st && !*sheet)
     st = pb_fail(err, PB_ERR_REFERENCE, "--datasheet",
                  name ? "there is no data sheet of %s" : "%s has several: name one",
                  name ? name : path);
-  for (size_t i = 0; i < r->figures && !st; i++) {
+  return st;
+}
+
+static pb_status put_sheet(const cJSON *sheet, characterize_result *r, pb_error *err) {
+  pb_status st = PB_OK;
+  r->sheet_stiffness = NAN;
+  for (size_t i = 0; i < r->figures && sheet && !st; i++) {
     pb_sheet_value v;
     part_figure *f = &r->figure[i];
-    snprintf(where, sizeof where, "/actuators/%s", name);
-    st = pb_sheet_read(sheet, where, f->key, &v, err);
+    st = pb_sheet_read(sheet, sheet->string, f->key, &v, err);
     f->low = v.low;
     f->high = v.high;
     if (!strcmp(f->key, "stiffness")) r->sheet_stiffness = v.low;
   }
-  cJSON_Delete(file);
   return st;
 }
 
@@ -163,13 +169,18 @@ int command_characterize(int argc, char **argv) {
   characterize_options o = {
       .nominal = {.stroke = 20e-6, .length = 0.02}, .load = 5.056, .f1 = 10, .f2 = 1e4};
   characterize_result r = {0};
+  cJSON *file = NULL;
+  const cJSON *sheet = NULL;
   pb_error err = {0};
   subject_defaults(&o.subject);
   pb_options_parse(&argp, argc, argv, &o);
-  pb_status st = o.subject.live.live ? characterize_live(&o, &r, &err) : from_file(&o, &r, &err);
-  if (!st) st = put_sheet(&o, &r, &err);
+  pb_status st = pb_result_check(&o.subject.result, &err);
+  if (!st) st = find_sheet(&o, &file, &sheet, &err);
+  if (!st) st = o.subject.live.live ? characterize_live(&o, &r, &err) : from_file(&o, &r, &err);
+  if (!st) st = put_sheet(sheet, &r, &err);
   if (!st) st = characterize_present(&o, &r, &err);
   free(r.hz);
   free(r.compliance);
+  cJSON_Delete(file);
   return pb_result_end(st, &err);
 }

@@ -4,7 +4,6 @@
 #include <stdlib.h>
 
 #include "characterize.h"
-#include "csv.h"
 #include "plot.h"
 
 static pb_status print(const characterize_options *o, const characterize_result *r, pb_error *err) {
@@ -22,16 +21,6 @@ static pb_status print(const characterize_options *o, const characterize_result 
   return PB_OK;
 }
 
-// An experiment has figures only.
-static pb_status figures_csv(const characterize_result *r, const char *path, pb_error *err) {
-  pb_csv csv = {0};
-  pb_status st = pb_csv_open(path, &csv, err);
-  if (st) return st;
-  for (size_t i = 0; i < r->figures; i++) pb_csv_column(&csv, r->figure[i].key, NULL);
-  for (size_t i = 0; i < r->figures; i++) pb_csv_number(&csv, r->figure[i].value);
-  return pb_csv_close(&csv, err);
-}
-
 static pb_status save(const characterize_options *o, const characterize_result *r, pb_error *err) {
   const response compliance = {"compliance", "m/N", r->compliance};
   char path[1024];
@@ -39,7 +28,7 @@ static pb_status save(const characterize_options *o, const characterize_result *
   pb_status st = pb_result_path(&o->subject.result, "characterize.csv", path, sizeof path, err);
   if (!st)
     st = r->compliance ? responses_csv(path, r->hz, CHARACTERIZE_POINTS, &compliance, 1, err)
-                       : figures_csv(r, path, err);
+                       : figures_csv(path, r->figure, r->figures, err);
   if (!st) st = pb_result_path(&o->subject.result, "characterize.mat", path, sizeof path, err);
   if (!st) st = pb_matfile_open(path, &mat, err);
   if (st) return st;

@@ -2,7 +2,6 @@
 #include <math.h>
 
 #include "actuator.h"
-#include "csv.h"
 #include "plot.h"
 #include "study/actuator_piezo.h"
 
@@ -83,20 +82,11 @@ static void fill(const pb_piezo *p, part_figure out[FIGURES]) {
   for (int i = 0; i < FIGURES; i++) out[i] = list[i];
 }
 
-static pb_status save_csv(const char *path, const part_figure *f, pb_error *err) {
-  pb_csv csv = {0};
-  pb_status st = pb_csv_open(path, &csv, err);
-  if (st) return st;
-  for (int i = 0; i < FIGURES; i++) pb_csv_column(&csv, f[i].key, NULL);
-  for (int i = 0; i < FIGURES; i++) pb_csv_number(&csv, f[i].value);
-  return pb_csv_close(&csv, err);
-}
-
 static pb_status save(const options *o, const part_figure *f, pb_error *err) {
   char path[1024];
   pb_matfile *mat;
   pb_status st = pb_result_path(&o->result, "constants.csv", path, sizeof path, err);
-  if (!st) st = save_csv(path, f, err);
+  if (!st) st = figures_csv(path, f, FIGURES, err);
   if (!st) st = pb_result_path(&o->result, "constants.mat", path, sizeof path, err);
   if (!st) st = pb_matfile_open(path, &mat, err);
   if (st) return st;

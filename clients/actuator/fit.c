@@ -8,6 +8,7 @@
 
 #include "assembly/motion.h"
 #include "frf_read.h"
+#include "outfile.h"
 #include "study/element_bench.h"
 
 enum {
@@ -231,7 +232,9 @@ int command_fit(int argc, char **argv) {
   subject_defaults(&o.subject);
   o.subject.wanted = "tune to one of: a FILE, --frf FILE, --live";
   pb_options_parse(&argp, argc, argv, &o);
-  pb_status st = o.subject.source.file ? from_file(&o, &r, &err) : from_measurement(&o, &r, &err);
+  pb_status st = pb_result_check(&o.subject.result, &err);
+  if (!st) st = pb_outfile_probe(o.write, &err);
+  if (!st) st = o.subject.source.file ? from_file(&o, &r, &err) : from_measurement(&o, &r, &err);
   fill_defaults(&o, &r);
   if (!st) st = tune(&o, &r, &err);
   if (!st) st = fit_present(&o, &r, &err);

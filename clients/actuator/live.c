@@ -64,21 +64,14 @@ void live_result_clear(live_result *r) {
 static pb_status choose_experiment(const live_options *o, const pb_bench *bench,
                                    pb_experiment_options *e, pb_error *err) {
   const double rate = bench->model->sample_rate;
-  pb_pole_list poles;
   *e = o->excite.experiment;
   if (e->rms == 0) e->rms = 1;
   if (e->f2 == 0) e->f1 = 1, e->f2 = fmin(1000, 0.4 * rate);
   if (e->resolution == 0) e->resolution = 0.5;
   if (e->averages == 0) e->averages = 2;
   if (o->excite.settle_given) return PB_OK;
-  pb_status st = pb_all_poles(bench->model, &poles, err);
-  if (st) return st;
   e->remove_transient = !bench->realtime;
-  e->settle = bench->realtime ? pb_settling_time(&poles, rate, e->f1, 1e-4, 120)
-                              : pb_settling_time(&poles, rate, 4 * e->f2, 1e-2, 5);
-  e->settle += (double)pb_model_delay(bench->model) / rate;
-  pb_pole_list_clear(&poles);
-  return PB_OK;
+  return pb_settle_seconds(bench->model, e->f1, e->f2, e->remove_transient, &e->settle, err);
 }
 
 static pb_status find(const pb_model *m, bool input, const char *name, const char *flag,

@@ -88,6 +88,15 @@ void figures_json(pb_jsonout *j, const part_figure *f, size_t count) {
   pb_jsonout_object_end(j);
 }
 
+pb_status figures_csv(const char *path, const part_figure *f, size_t count, pb_error *err) {
+  pb_csv csv = {0};
+  pb_status st = pb_csv_open(path, &csv, err);
+  if (st) return st;
+  for (size_t i = 0; i < count; i++) pb_csv_column(&csv, f[i].key, NULL);
+  for (size_t i = 0; i < count; i++) pb_csv_number(&csv, f[i].value);
+  return pb_csv_close(&csv, err);
+}
+
 void figures_mat(pb_matfile *mat, const part_figure *f, size_t count) {
   for (size_t i = 0; i < count; i++) pb_matfile_scalar(mat, f[i].key, f[i].value);
 }

@@ -19,11 +19,12 @@ pb_status channel_response(const pb_model *model, const char *input, const char 
 // A row "name, value in its unit, data sheet, difference" of a table of figures.
 typedef struct part_figure {
   const char *key, *name, *unit;
-  double scale, value;  // SI value × scale is in unit
+  double scale, value;  // SI value × scale is in unit; JSON, CSV and MAT have the SI value
   double low, high;     // data sheet; NaN: unknown
 } part_figure;
 pb_status figures_print(const part_figure *list, size_t count, bool sheet, pb_error *err);
 void figures_json(pb_jsonout *json, const part_figure *list, size_t count);
+pb_status figures_csv(const char *path, const part_figure *list, size_t count, pb_error *err);
 void figures_mat(pb_matfile *mat, const part_figure *list, size_t count);
 
 // A CSV of responses: frequency, real and imaginary part of each.

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "options.h"
+#include "results.h"
 
 static void print_help(FILE *stream, const char *tool, const char *about, const pb_command *c) {
   fprintf(stream, "Usage: %s COMMAND [OPTION...]\n%s\n\nCommands:\n", tool, about);
@@ -40,7 +40,8 @@ int pb_commands_run(int argc, char **argv, const char *about, const pb_command *
     argv[1] = name;
     int code = c->run(argc - 1, argv + 1);
     free(name);
-    return code;
+    // Also where the command does not look itself.
+    return code == PB_EXIT_DONE ? pb_result_end(PB_OK, NULL) : code;
   }
   if (word[0]) fprintf(stderr, "%s: '%s' is not one of its commands\n", tool, word);
   print_help(stderr, tool, about, commands);

@@ -3,8 +3,9 @@
 //   T)
 // Usage: plantbus-example INPUT OUTPUT GAIN SECONDS [DOMAIN]
 #include <stdio.h>
-#include <stdlib.h>
+#include <string.h>
 
+#include "options.h"
 #include "session.h"
 
 typedef struct controller {
@@ -32,21 +33,27 @@ static int fail(const pb_error *err) {
 }
 
 int main(int argc, char **argv) {
-  if (argc < 5) {
-    fprintf(stderr, "usage: plantbus-example INPUT OUTPUT GAIN SECONDS [DOMAIN]\n");
-    return 2;
+  double gain, seconds;
+  uint64_t domain = 0;
+  bool good = (argc == 5 || argc == 6) && pb_parse_double(argv[3], &gain) &&
+              pb_parse_double(argv[4], &seconds) && seconds >= 0 &&
+              (argc == 5 || pb_parse_uint64(argv[5], &domain));
+  if (!good) {
+    bool help = argc == 2 && !strcmp(argv[1], "--help");
+    fprintf(help ? stdout : stderr, "usage: plantbus-example INPUT OUTPUT GAIN SECONDS [DOMAIN]\n");
+    return help ? 0 : 2;
   }
   pb_error err = {0};
   pb_session *session = NULL;
-  pb_session_options where = {.domain = argc > 5 ? (uint32_t)atoi(argv[5]) : 0};
+  pb_session_options where = {.domain = (uint32_t)domain};
   if (pb_session_open(&where, &session, &err)) return fail(&err);
 
   const pb_model *model = pb_session_model(session);
   double dt = 1 / model->sample_rate;
   controller c = {.output = pb_model_output(model, argv[2]),
                   .keep = 1 - 2 * 3.14159265 * 2 * dt,
-                  .gain = atof(argv[3]) * dt,
-                  .steps = (uint64_t)(atof(argv[4]) * model->sample_rate)};
+                  .gain = gain * dt,
+                  .steps = (uint64_t)(seconds * model->sample_rate)};
   if (c.output < 0) {
     fprintf(stderr, "plantbus-example: the plant has no output \"%s\"\n", argv[2]);
     pb_session_close(session);

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "jsonout.h"
-#include "options.h"
+#include "results.h"
 #include "study/gate.h"
 #include "table.h"
 
@@ -27,8 +27,8 @@ static const char description[] =
     "attainable "
     "damping, coupling, order and the forces along the struts (config/specifications holds "
     "one).\n\n"
-    "Exit codes: 0 all limits are held; 1 one is missed, or the plant cannot be judged; 2 wrong "
-    "command line or specification.";
+    "Exit codes: 0 all limits are held; 1 one is missed, the plant cannot be judged, or a file not "
+    "read; 2 wrong command line or specification.";
 
 static error_t parse(int key, char *text, struct argp_state *state) {
   gate_options *o = state->input;
@@ -153,15 +153,14 @@ int main(int argc, char **argv) {
   pb_options_parse(&argp, argc, argv, &o);
   if (openblas_set_num_threads) openblas_set_num_threads(1);
   pb_status status = read_spec(&o, &gate, &err);
-  int code = status ? PB_EXIT_USAGE : PB_EXIT_DONE;
+  int code = !status ? PB_EXIT_DONE : status == PB_ERR_IO ? PB_EXIT_FAILED : PB_EXIT_USAGE;
   if (!status) {
     status = judge(&o, &gate, &err);
     if (!status && o.json)
       print_json(&o, &gate);
     else if (!status)
       status = print_table(&o, &gate, &err);
-    if (!status && (fflush(stdout) != 0 || ferror(stdout)))
-      status = pb_fail(&err, PB_ERR_IO, "stdout", "the report cannot be written");
+    if (!status) status = pb_result_flush(&err);
     code = !status && gate.passed ? PB_EXIT_DONE : PB_EXIT_FAILED;
   }
   if (status) pb_print_error(stderr, &err);

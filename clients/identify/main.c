@@ -92,17 +92,10 @@ static pb_status choose_settling(const identify_options *o, const pb_bench *benc
                                  pb_experiment_options *e, pb_error *err) {
   bool removable = e->excitation != PB_EXCITE_NOISE && !bench->realtime && o->coherence_target == 0;
   if (o->excite.settle_given) return PB_OK;
-  pb_pole_list poles;
-  pb_status status = pb_all_poles(bench->model, &poles, err);
-  if (status != PB_OK) return status;
-  double rate = bench->model->sample_rate;
   e->remove_transient = removable;
-  e->settle = removable ? pb_settling_time(&poles, rate, 4 * e->f2, 1e-2, 5)
-                        : pb_settling_time(&poles, rate, e->f1, 1e-4, 120);
-  e->settle += (double)pb_model_delay(bench->model) / rate;
+  pb_status status = pb_settle_seconds(bench->model, e->f1, e->f2, removable, &e->settle, err);
   if (e->excitation == PB_EXCITE_NOISE && !e->one_at_a_time) e->settle = 0;
-  pb_pole_list_clear(&poles);
-  return PB_OK;
+  return status;
 }
 
 static pb_status fill_defaults(const identify_options *o, const pb_bench *bench,

@@ -54,6 +54,19 @@ double pb_settling_time(const pb_pole_list *poles, double sample_rate, double f1
   return slowest;
 }
 
+pb_status pb_settle_seconds(const pb_model *model, double f1, double f2, bool removable,
+                            double *seconds, pb_error *err) {
+  const double rate = model->sample_rate;
+  pb_pole_list poles;
+  pb_status status = pb_all_poles(model, &poles, err);
+  if (status != PB_OK) return status;
+  *seconds = removable ? pb_settling_time(&poles, rate, 4 * f2, 1e-2, 5)
+                       : pb_settling_time(&poles, rate, f1, 1e-4, 120);
+  *seconds += (double)pb_model_delay(model) / rate;
+  pb_pole_list_clear(&poles);
+  return PB_OK;
+}
+
 // The model with one input and one output only, without electronics, which move no zero; shares all
 // other arrays.
 static pb_model one_channel(const pb_model *m, size_t output, size_t input, double *c, double *d) {

@@ -28,6 +28,12 @@ pb_status pb_exact_zeros(const pb_model *model, size_t output, size_t input, dou
 double pb_settling_time(const pb_pole_list *poles, double sample_rate, double f1, double level,
                         double longest);
 
+// Seconds at the start of an experiment that are not used: until what lies above the band has died
+// down where the decay of the band is `removable` afterwards, else until the band has too; and the
+// delay of the electronics. [init]
+pb_status pb_settle_seconds(const pb_model *model, double f1, double f2, bool removable,
+                            double *seconds, pb_error *err);
+
 // All poles of the model, for pb_settling_time. [init]
 pb_status pb_all_poles(const pb_model *model, pb_pole_list *out, pb_error *err);
 

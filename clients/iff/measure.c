@@ -9,18 +9,8 @@
 
 enum { FIT_CHANNELS = 8 };
 
-// Seconds at the start of a stage that are not used: until what lies above the band has died down
-// when the decay of the band can be taken out afterwards, else until everything has.
 static pb_status settle_open(const iff_result *r, bool removable, double *seconds, pb_error *err) {
-  pb_pole_list poles;
-  pb_status status = pb_all_poles(r->model, &poles, err);
-  if (status != PB_OK) return status;
-  double rate = r->model->sample_rate;
-  *seconds = removable ? pb_settling_time(&poles, rate, 4 * r->experiment.f2, 1e-2, 5)
-                       : pb_settling_time(&poles, rate, r->experiment.f1, 1e-4, 120);
-  *seconds += (double)pb_model_delay(r->model) / rate;
-  pb_pole_list_clear(&poles);
-  return PB_OK;
+  return pb_settle_seconds(r->model, r->experiment.f1, r->experiment.f2, removable, seconds, err);
 }
 
 // Closed, the controller's own poles come below the band, too slow for their decay to be told from

@@ -105,19 +105,6 @@ static pb_status give_back(const live *l, pb_status before, pb_error *err) {
 
 // ---- measuring ----------------------------------------------------------------------------------
 
-static pb_status settle(const pb_bench *bench, pb_experiment_options *e, pb_error *err) {
-  pb_pole_list poles;
-  pb_status status = pb_all_poles(bench->model, &poles, err);
-  if (status) return status;
-  const double rate = bench->model->sample_rate;
-  e->remove_transient = !bench->realtime;
-  e->settle = bench->realtime ? pb_settling_time(&poles, rate, e->f1, 1e-4, 120)
-                              : pb_settling_time(&poles, rate, 4 * e->f2, 1e-2, 5);
-  e->settle += (double)pb_model_delay(bench->model) / rate;
-  pb_pole_list_clear(&poles);
-  return PB_OK;
-}
-
 static pb_status estimate(const live *l, pb_bench *bench, const pb_experiment_channels *channels,
                           pb_analysis *out, pb_error *err) {
   const pb_study_options *o = &l->options->point;
@@ -130,8 +117,10 @@ static pb_status estimate(const live *l, pb_bench *bench, const pb_experiment_ch
                              .rms = 1,
                              .resolution = 0.5,
                              .averages = 2,
-                             .seed = 1};
-  pb_status status = settle(bench, &e, err);
+                             .seed = 1,
+                             .remove_transient = !bench->realtime};
+  pb_status status =
+      pb_settle_seconds(bench->model, e.f1, e.f2, e.remove_transient, &e.settle, err);
   if (!status)
     status = pb_experiment_new(bench->model, channels, NULL, &e, bench->realtime, &experiment, err);
   if (!status) status = pb_experiment_begin(experiment, err);

@@ -35,7 +35,9 @@ pb_status pb_variation_number(const pb_variation *v, double *out, pb_error *err)
   }
   errno = 0;
   double value = strtod(v->text, &end);
-  bool good = end != v->text && !*end && isfinite(value) && errno == 0;
+  // strtod alone also takes blanks and hexadecimal.
+  bool plain = !v->text[strspn(v->text, "+-.0123456789eE")];
+  bool good = plain && end != v->text && !*end && isfinite(value) && errno == 0;
   bool positive = v->kind == PB_STUDY_AXIAL;
   if (!good || value < 0 || (positive && value == 0)) {
     return pb_fail(err, PB_ERR_ARGUMENT, facts->name, "'%s' is not a number %s 0 in %s%s", v->text,
