@@ -81,8 +81,10 @@ pb_status pb_result_check(const pb_result_options *o, pb_error *err) {
 // ---- the end ------------------------------------------------------------------------------------
 
 pb_status pb_result_flush(pb_error *err) {
+  errno = 0;
   if (fflush(stdout) == 0 && !ferror(stdout)) return PB_OK;
-  return pb_fail(err, PB_ERR_IO, "standard output", "the report cannot be written");
+  return pb_fail(err, PB_ERR_IO, "standard output",
+                 errno ? "cannot be written: %s" : "cannot be written", strerror(errno));
 }
 
 int pb_result_end(pb_status status, const pb_error *err) {

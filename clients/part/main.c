@@ -1,7 +1,4 @@
 // plantbus-part: parts of one's own, from dimensions or from other programs' matrices to elements.
-#include <stdio.h>
-
-#include "options.h"
 #include "part.h"
 
 static const pb_command commands[] = {
@@ -14,13 +11,7 @@ static const pb_command commands[] = {
 };
 
 int main(int argc, char **argv) {
-  int code = pb_commands_run(
-      argc, argv, "Builds, reduces, imports and examines super-elements for plant files.",
-      commands);
-  if (!fflush(stdout) && !ferror(stdout)) return code;
-  if (code != PB_EXIT_DONE) return code;
-  pb_error err = {0};
-  pb_fail(&err, PB_ERR_IO, "standard output", "cannot be written: %m");
-  pb_print_error(stderr, &err);
-  return PB_EXIT_FAILED;
+  return pb_commands_run(argc, argv,
+                         "Builds, reduces, imports and examines super-elements for plant files.",
+                         commands);
 }
