@@ -173,6 +173,9 @@ static pb_status plot(const select_result *j, const char *path, pb_error *err) {
     top = fmax(top, y[count]);
     count++;
   }
+  if (count == 0)
+    return pb_fail(err, PB_ERR_ARGUMENT, "--plot", "no actuator's stroke and stiffness are known");
+  for (size_t i = 0; i < count; i++) text[i].x += 0.012 * right;  // beside its point
   const pb_plot_curve curve = {NULL, PB_PLOT_SQUARE, 1, count, x, y};
   // From zero, and with room for the name of the last one.
   const pb_plot_panel panel = {.x = {.label = "Axial stiffness (N/µm)", .max = 1.15 * right},
