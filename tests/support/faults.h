@@ -1,5 +1,6 @@
 // Allocations that fail. The linker routes those of the program through faults.c (pb_test's
-// FAULTS); those of libraries that take allocators of their own come by hooks to the same functions.
+// FAULTS); those of libraries that take allocators of their own come by hooks to the same
+// functions.
 #ifndef PB_TESTS_FAULTS_H
 #define PB_TESTS_FAULTS_H
 
