@@ -16,6 +16,8 @@ enum { SAMPLE_DEPTH = 32768, OTHER_DEPTH = 4096, DESCRIPTION_DEPTH = 16 };
 
 static const int64_t wait_ns = 50000000;     // between looks around when nothing comes
 static const int64_t gather_ns = 2000000;    // so that a wake-up is worth its while
+static const int64_t quiet_ns = 20000000;    // without a message, after the last sample
+static const int64_t rest_ns = 200000000;    // at most, after the last sample
 static const int64_t flush_ns = 1000000000;  // a recorder that is killed loses no more than this
 
 static int64_t clock_now(void) {
@@ -120,6 +122,19 @@ static pb_status everything_take(recorder *r, pb_error *err) {
   return status;
 }
 
+// What belongs to the last sample comes from other writers, and perhaps after it: taken until
+// nothing has come for a moment.
+static pb_status rest_take(recorder *r, pb_error *err) {
+  const int64_t end = clock_now() + rest_ns;
+  pb_status status = PB_OK;
+  while (!status && clock_now() < end && dds_waitset_wait(r->waitset, NULL, 0, quiet_ns) > 0) {
+    const struct timespec pause = {0, gather_ns};
+    nanosleep(&pause, NULL);
+    status = everything_take(r, err);
+  }
+  return status;
+}
+
 static void progress_show(recorder *r, pb_progress *line) {
   const pb_spans *s = &r->report->spans;
   const record_options *o = r->options;
@@ -145,6 +160,7 @@ static pb_status record(recorder *r, pb_error *err) {
       nanosleep(&pause, NULL);
     }
     status = everything_take(r, err);  // also what came before the end
+    if (r->done && !status) status = rest_take(r, err);
     if (r->done || status) break;
     if (interrupted || gone) {
       r->report->end = interrupted ? RECORD_END_INTERRUPTED : RECORD_END_GONE;
