@@ -204,7 +204,7 @@ static double measure_bare_changed(const bench_plant *plant, double rate, double
 static changing measure_changing(const bench_plant *plant, double rate, double seconds) {
   const uint32_t number = bench_domain();
   char domain[16];
-  changing c = {.bare_changed = measure_bare_changed(plant, rate, seconds)};
+  changing c = {.bare_changed = measure_bare_changed(plant, rate, seconds), .seconds = NAN};
   snprintf(domain, sizeof domain, "%u", number);
   bench_child daemon = daemon_start(plant, rate, number);
   cJSON *begin = status_of(domain);

@@ -64,7 +64,7 @@ static void reduce_ours(shared *s) {
   bench_blas_threads(1);
   load_model(s, &part, &mesh, &fem);
   pb_mesh_clear(&mesh);
-  pb_reduce_options options = {.modes = MODES};
+  pb_reduce_options options = {.modes = MODES, .spend = &fem.k};
   bench_check(pb_reduce(&fem, &options, false, &r, &err), &err);
   if (!(r->rigid_residual < 1e-11))
     bench_fail("rigid motions have forces of %g", r->rigid_residual);

@@ -4,6 +4,7 @@
 // Roofline: flops and bytes a step needs at least, over the peaks of this core (peaks.h), each
 // model beside the bandwidth of a buffer of its own size.
 #include <math.h>
+#include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -185,6 +186,54 @@ static roofs measure_roofs(bench *b) {
   return r;
 }
 
+// ---- the processor ------------------------------------------------------------------------------
+
+// Shortest of several batches, seconds a step.
+static double shortest(subject *s) {
+  enum { BATCHES = 20, STEPS = 20000 };
+  double best = INFINITY;
+  for (int k = 0; k < BATCHES; k++) {
+    const double since = bench_now();
+    step_ours(s, STEPS);
+    best = fmin(best, (bench_now() - since) / STEPS);
+  }
+  return best;
+}
+
+// A processor that shares its core with another one at work, perhaps another machine's, steps up to
+// 1.5 times as slowly while products that wait for memory hardly notice: everything is measured on
+// the one that is least disturbed.
+static void choose_processor(bench *b, const bench_plants *plants) {
+  const bench_plant *plant = bench_plants_find(plants, 48);
+  cpu_set_t all, one;
+  int best = -1, count = 0;
+  double quickest = INFINITY, slowest = 0;
+  if (!plant || sched_getaffinity(0, sizeof all, &all) != 0) return;
+  subject s = subject_open(plant);
+  for (int cpu = 0; cpu < CPU_SETSIZE; cpu++) {
+    if (!CPU_ISSET(cpu, &all)) continue;
+    CPU_ZERO(&one);
+    CPU_SET(cpu, &one);
+    if (sched_setaffinity(0, sizeof one, &one) != 0) continue;
+    const double seconds = shortest(&s);
+    count++;
+    slowest = fmax(slowest, seconds);
+    if (seconds >= quickest) continue;
+    quickest = seconds;
+    best = cpu;
+  }
+  subject_close(&s);
+  if (best < 0) return;
+  CPU_ZERO(&one);
+  CPU_SET(best, &one);
+  sched_setaffinity(0, sizeof one, &one);
+  bench_note(
+      b,
+      "Measured on processor %d, the quickest of %d: a step of 48 states took %.0f ns there, "
+      "%.0f ns on the slowest.",
+      best, count, 1e9 * quickest, 1e9 * slowest);
+}
+
 int main(int argc, char **argv) {
   bench *b =
       bench_begin(argc, argv, "step",
@@ -196,6 +245,7 @@ int main(int argc, char **argv) {
   pb_flush_denormals();
   bench_plants plants = bench_plants_load(bench_quick(b) ? 1000 : 0);
   bench_blas_threads(1);
+  choose_processor(b, &plants);
   tables t = {.peak = measure_roofs(b)};
   t.step = bench_table_add(b, "step", "One step, all inputs and outputs", "plant",
                            sizeof step_columns / sizeof *step_columns, step_columns);

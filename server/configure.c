@@ -134,6 +134,7 @@ static pb_status model_arm(pb_daemon *d, pb_error *err) {
   if (job->handover && pb_carrier_start(&p->carrier, job->handover)) {
     job->handover = NULL;
     change->carrier = &p->carrier;
+    change->ahead = p->carrier.handover->steps;
   }
   arm(d);
   return PB_OK;

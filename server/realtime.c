@@ -94,10 +94,11 @@ static void change_make(pb_realtime *rt, step_run *run, pb_change *change) {
 
 // Whether a change is to begin at this step: at its own, or as many steps ahead as it is spread
 // over, where there are so many. One that is to be made as soon as possible is made after them.
+// Looks at nothing that the change points to, as it may be taken back meanwhile.
 static bool change_begins(const pb_realtime *rt, step_run *run, const pb_change *change,
                           bool *spread) {
   const uint64_t step = rt->stepper->state->step;
-  const uint64_t ahead = change->carrier ? change->carrier->handover->steps : 0;
+  const uint64_t ahead = change->ahead;
   if (step + ahead < change->at_step) return false;
   if (step < change->at_step && step + ahead > change->at_step) run->whole = change;
   *spread = ahead > 0 && run->whole != change;
@@ -106,7 +107,7 @@ static bool change_begins(const pb_realtime *rt, step_run *run, const pb_change 
 
 static void change_spread(pb_realtime *rt, step_run *run, pb_change *change) {
   run->spread = change;
-  run->due = rt->stepper->state->step + change->carrier->handover->steps;
+  run->due = rt->stepper->state->step + change->ahead;
   pb_handover_begin(change->carrier->handover, rt->stepper->state);
   sem_post(&change->carrier->begun);
 }
@@ -128,6 +129,7 @@ static void change_look(pb_realtime *rt, step_run *run) {
     return;
   }
   pb_change *change = atomic_load_explicit(&rt->change, memory_order_acquire);
+  if (!change) run->whole = NULL;  // taken back, perhaps
   if (!change || !change_begins(rt, run, change, &spread)) return;
   // Taken out before it is begun or made: it may be revoked up to here.
   if (!atomic_compare_exchange_strong(&rt->change, &change, NULL)) return;

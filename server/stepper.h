@@ -56,6 +56,7 @@ typedef struct pb_change {
   pb_state *state;        // of that model
   pb_transfer *transfer;  // from the old state to the new one; NULL: `state` is taken as it is
   pb_carrier *carrier;    // real time: prepared to spread the transfer over steps; NULL: it is not
+  size_t ahead;           // steps over which the carrier's handover is spread
   pb_handover *handover;  // set by whoever makes the change when all of it was spread
   uint32_t revision;
   int input_from[PB_STEPPER_INPUTS];  // old index of each input of the model; −1: new

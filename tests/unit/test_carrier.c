@@ -134,6 +134,7 @@ static void run(rig *r, uint64_t at_step, uint64_t expected) {
   const pb_realtime_options options = {.speed = 0.05, .cpu = -1};
   pb_error err;
   r->change.at_step = at_step;
+  r->change.ahead = r->change.carrier->handover->steps;
   pb_realtime_change(r->realtime, &r->change);
   assert_int_equal(pb_realtime_start(r->realtime, &options, u, &err), PB_OK);
   pb_record record = {0};
@@ -201,6 +202,7 @@ static void a_stop_on_the_way_makes_the_change(void **state) {
   const pb_realtime_options options = {.speed = 0.01, .cpu = -1};
   pb_error err;
   assert_true(pb_carrier_start(&r->carrier, handover_of(r, 100000)));
+  r->change.ahead = 100000;
   pb_realtime_change(r->realtime, &r->change);
   assert_int_equal(pb_realtime_start(r->realtime, &options, u, &err), PB_OK);
   const struct timespec pause = {0, 1000000};
@@ -219,6 +221,7 @@ static void one_that_waits_for_its_step_can_be_taken_back(void **state) {
   const pb_realtime_options options = {.speed = 0.05, .cpu = -1};
   pb_error err;
   assert_true(pb_carrier_start(&r->carrier, handover_of(r, 10)));
+  r->change.ahead = 10;
   r->change.at_step = 1000000000;
   pb_realtime_change(r->realtime, &r->change);
   assert_int_equal(pb_realtime_start(r->realtime, &options, u, &err), PB_OK);
