@@ -23,4 +23,12 @@ size_t pb_product_panel(size_t n);
 
 void pb_product_make(const pb_product *product, const pb_workers *workers);
 
+// out [rows] += A v, A rows × columns. Column after column: each sum in the order of its row, many
+// rows at once. [rt]
+static inline void pb_add_columns(size_t rows, size_t columns, const double *restrict a,
+                                  const double *restrict v, double *restrict out) {
+  for (size_t k = 0; k < columns; k++, a += rows)
+    for (size_t r = 0; r < rows; r++) out[r] += a[r] * v[k];
+}
+
 #endif

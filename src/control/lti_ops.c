@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/lapack.h"
+#include "base/product.h"
 
 // M[r0.., c0..] = scale · S, S rows × columns without padding; M has ld rows.
 static void put(double *m, size_t ld, size_t r0, size_t c0, const double *s, size_t rows,
@@ -238,21 +239,14 @@ pb_status pb_lti_delay(const pb_lti *lti, unsigned samples, pb_lti *out, pb_erro
   return status;
 }
 
-// out += M v, column after column: each sum in the order of its row, many rows at once.
-static void add_columns(size_t rows, size_t columns, const double *restrict m,
-                        const double *restrict v, double *restrict out) {
-  for (size_t k = 0; k < columns; k++, m += rows)
-    for (size_t r = 0; r < rows; r++) out[r] += m[r] * v[k];
-}
-
 void pb_lti_step(const pb_lti *lti, double *x, double *scratch, const double *u, double *y) {
   size_t nx = lti->nx, nu = lti->nu, ny = lti->ny;
   memset(y, 0, ny * sizeof *y);
-  add_columns(ny, nx, lti->c, x, y);
-  add_columns(ny, nu, lti->d, u, y);
+  pb_add_columns(ny, nx, lti->c, x, y);
+  pb_add_columns(ny, nu, lti->d, u, y);
   if (nx == 0) return;
   memset(scratch, 0, nx * sizeof *x);
-  add_columns(nx, nx, lti->a, x, scratch);
-  add_columns(nx, nu, lti->b, u, scratch);
+  pb_add_columns(nx, nx, lti->a, x, scratch);
+  pb_add_columns(nx, nu, lti->b, u, scratch);
   memcpy(x, scratch, nx * sizeof *x);
 }

@@ -66,23 +66,18 @@ void pb_handover_begin(pb_handover *h, const pb_state *before) {
   h->taken = 0;
 }
 
-static void add_columns(size_t rows, size_t cols, const double *a, const double *v, double *out) {
-  for (size_t j = 0; j < cols; j++)
-    for (size_t i = 0; i < rows; i++) out[i] += a[i + j * rows] * v[j];
-}
-
 void pb_handover_carry(pb_handover *h) {
   const pb_model *m = h->transfer->from;
   const size_t mx = h->transfer->to->nx;
   for (size_t k = 0; k < h->steps; k++) pb_step_state(m, h->base, h->rest, h->scratch);
   memset(h->carried, 0, mx * sizeof *h->carried);
-  add_columns(mx, m->nx, h->transfer->x, h->base, h->carried);
+  pb_add_columns(mx, m->nx, h->transfer->x, h->base, h->carried);
 }
 
 void pb_handover_follow(pb_handover *h, const pb_state *before) {
   const pb_model *m = h->transfer->from;
   const size_t mx = h->transfer->to->nx, left = h->steps - 1 - h->taken++;
-  add_columns(mx, m->nu, h->g + left * mx * m->nu, before->data + m->nx, h->driven);
+  pb_add_columns(mx, m->nu, h->g + left * mx * m->nu, before->data + m->nx, h->driven);
 }
 
 void pb_handover_apply(pb_handover *h, const pb_state *before, pb_state *after) {

@@ -232,16 +232,11 @@ void pb_transfer_free(pb_transfer *t) {
   free(t);
 }
 
-static void add_columns(size_t rows, size_t cols, const double *a, const double *v, double *out) {
-  for (size_t j = 0; j < cols; j++)
-    for (size_t i = 0; i < rows; i++) out[i] += a[i + j * rows] * v[j];
-}
-
 // With X x in its place.
 static void finish(pb_transfer *t, const pb_state *before, pb_state *after) {
   memcpy(t->before, before, pb_state_bytes(t->from));
   pb_electronics_carry(t->from, before, t->input_from, t->output_from, t->to, after);
-  add_columns(t->to->nx, t->from->nu, t->u, before->data + t->from->nx, after->data);
+  pb_add_columns(t->to->nx, t->from->nu, t->u, before->data + t->from->nx, after->data);
   after->step = before->step;
   pb_state_measure(t->to, after);
   memcpy(t->after, after, pb_state_bytes(t->to));
@@ -251,7 +246,7 @@ void pb_transfer_apply(pb_transfer *t, const pb_state *before, pb_state *after) 
   const size_t nx = t->from->nx, mx = t->to->nx;
   if (t->x) {
     memset(after->data, 0, mx * sizeof *after->data);
-    add_columns(mx, nx, t->x, before->data, after->data);
+    pb_add_columns(mx, nx, t->x, before->data, after->data);
   } else {
     memcpy(after->data, before->data, mx * sizeof *after->data);
   }

@@ -13,9 +13,9 @@
 
 #include <cmocka.h>
 
-#include "base/json.h"
 #include "fpenv.h"
 #include "realtime.h"
+#include "support/patched.h"
 
 static const double u[2] = {3.0, -1.5};
 
@@ -30,18 +30,11 @@ typedef struct rig {
 } rig;
 
 static void plant_make(const char *patch, pb_model **model, pb_motion_map **map) {
-  char *text = NULL;
-  cJSON *file = NULL, *change = cJSON_Parse(patch);
+  char *text = patched_plant(PB_TEST_DATA "/bus-bench.json", patch);
   pb_error err = {PB_OK, "", ""};
-  assert_int_equal(pb_json_read(PB_TEST_DATA "/bus-bench.json", &file, NULL, NULL), PB_OK);
-  cJSON *merged = pb_json_merge(file, change);
-  assert_int_equal(pb_json_print(merged, &text, NULL), PB_OK);
   if (pb_model_parse(text, strlen(text), NULL, NULL, model, map, NULL, &err))
     fail_msg("%s: %s", err.where, err.message);
   free(text);
-  cJSON_Delete(file);
-  cJSON_Delete(change);
-  cJSON_Delete(merged);
 }
 
 static int rig_open(void **state) {

@@ -10,9 +10,9 @@
 
 #include <cmocka.h>
 
-#include "base/json.h"
 #include "model/transfer.h"
 #include "pool.h"
+#include "support/patched.h"
 
 typedef struct made {
   pb_model *model;
@@ -20,21 +20,15 @@ typedef struct made {
 } made;
 
 static made make(const char *plant, const char *patch, const pb_means *means) {
-  char path[512], *text = NULL;
-  cJSON *file = NULL, *change = cJSON_Parse(patch);
+  char path[512];
   made m = {0};
   pb_error err = {PB_OK, "", ""};
   snprintf(path, sizeof path, PB_CONFIG "/plants/%s.json", plant);
-  assert_int_equal(pb_json_read(path, &file, NULL, NULL), PB_OK);
-  cJSON *merged = pb_json_merge(file, change);
-  assert_int_equal(pb_json_print(merged, &text, NULL), PB_OK);
+  char *text = patched_plant(path, patch);
   if (pb_model_parse_with(text, strlen(text), PB_CONFIG "/plants", means, NULL, &m.model, &m.map,
                           NULL, &err))
     fail_msg("%s: %s", err.where, err.message);
   free(text);
-  cJSON_Delete(file);
-  cJSON_Delete(change);
-  cJSON_Delete(merged);
   return m;
 }
 

@@ -15,6 +15,7 @@
 #include "base/json.h"
 #include "model/transfer.h"
 #include "support/beam.h"
+#include "support/patched.h"
 
 typedef struct side {
   pb_model *model;
@@ -59,17 +60,9 @@ static void side_free(side *s) {
 
 // A plant file of config/plants with a merge patch.
 static char *patched(const char *name, const char *patch) {
-  char path[512], *text = NULL;
-  cJSON *file = NULL, *change = cJSON_Parse(patch);
+  char path[512];
   snprintf(path, sizeof path, PB_CONFIG "/plants/%s.json", name);
-  assert_int_equal(pb_json_read(path, &file, NULL, NULL), PB_OK);
-  assert_non_null(change);
-  cJSON *merged = pb_json_merge(file, change);
-  assert_int_equal(pb_json_print(merged, &text, NULL), PB_OK);
-  cJSON_Delete(file);
-  cJSON_Delete(change);
-  cJSON_Delete(merged);
-  return text;
+  return patched_plant(path, patch);
 }
 
 static side side_patched(const char *name, const char *patch) {
