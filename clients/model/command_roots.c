@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "model/sampled_roots.h"
 #include "model/zeros.h"
 #include "plot.h"
 #include "tool.h"
@@ -20,7 +21,7 @@ int command_modes(const tool *t, const pb_model *model) {
   return emit_columns(t, &(columns){.count = 2, .rows = rows, .column = c});
 }
 
-// ---- poles and zeros ----------------------------------------------------------------------------
+// ---- poles --------------------------------------------------------------------------------------
 
 // Roots in columns of their own: |s|/2π, damping, real and imaginary part.
 typedef struct root_list {
@@ -54,15 +55,14 @@ static bool root_list_fill(const tool *t, const double complex *root, size_t cou
   return true;
 }
 
-static int emit_roots(const tool *t, const root_list *list, const channels *ch, const char *key,
-                      const char *unit) {
+static int emit_poles(const tool *t, const root_list *list, const char *unit) {
   const column c[] = {
-      {key, "frequency", "Hz", 7, list->hz},
+      {"poles_hz", "frequency", "Hz", 7, list->hz},
       {"damping", "damping", NULL, 4, list->damping},
       {"real", "real part", unit, 7, list->real},
       {"imag", "imaginary part", unit, 7, list->imag},
   };
-  return emit_columns(t, &(columns){.count = 4, .rows = list->count, .column = c, .channels = ch});
+  return emit_columns(t, &(columns){.count = 4, .rows = list->count, .column = c});
 }
 
 static int compare_size(const void *a, const void *b) {
@@ -98,7 +98,7 @@ int command_poles(const tool *t, const pb_model *model) {
     status = pb_fail_memory(&err, t->file);
   }
   int code = tool_end(status, &err);
-  if (!code) code = emit_roots(t, &list, NULL, "poles_hz", t->sampled ? NULL : "rad/s");
+  if (!code) code = emit_poles(t, &list, t->sampled ? NULL : "rad/s");
   if (!code && t->out_format == FORMAT_PNG) {
     for (size_t k = 0; k < model->nx; k++) {
       pole[k] = as_continuous(pole[k], t->sampled, model->sample_rate);
@@ -110,9 +110,73 @@ int command_poles(const tool *t, const pb_model *model) {
   return code;
 }
 
-// Zeros of the chosen channel; beyond the size that can be treated whole only below Nyquist.
+// ---- zeros, of the plant and of the sampled plant -----------------------------------------------
+
+enum { ZERO_COLUMNS = 7 };
+
+typedef struct zero_list {
+  size_t count;
+  double *value[ZERO_COLUMNS];  // of one block of memory, at value[0]
+} zero_list;
+
+// Both of a pair of conjugates, each with what sampling makes of it; NaN where nothing is known.
+static bool zero_list_fill(const pb_sampled_root *root, size_t count, zero_list *list) {
+  double *data = malloc((2 * count * ZERO_COLUMNS + 1) * sizeof *data);
+  *list = (zero_list){.value = {data}};
+  if (!data) return false;
+  for (size_t c = 0; c < ZERO_COLUMNS; c++) list->value[c] = data + c * 2 * count;
+  for (size_t k = 0; k < count; k++) {
+    const pb_sampled_root *r = &root[k];
+    const double row[ZERO_COLUMNS] = {r->hz,
+                                      r->damping,
+                                      creal(r->s),
+                                      cimag(r->s),
+                                      r->has_sampled ? r->sampled_hz : NAN,
+                                      r->has_sampled ? r->sampled_damping : NAN,
+                                      (double)r->multiplicity};
+    for (int twin = 0; twin < (cimag(r->s) > 0 ? 2 : 1); twin++, list->count++)
+      for (size_t c = 0; c < ZERO_COLUMNS; c++)
+        list->value[c][list->count] = c == 3 && twin ? -row[c] : row[c];
+  }
+  return true;
+}
+
+// One line where the damping of a sampled zero has the sign that the plant's has not.
+static void print_signs(const pb_model *model, const pb_sampled_root *root, size_t count) {
+  size_t differ = 0;
+  for (size_t k = 0; k < count; k++) {
+    if (!root[k].sign_differs || (k > 0 && root[k].s == root[k - 1].s)) continue;
+    printf(differ++ ? ", %.5g Hz" : "The damping changes its sign at %.5g Hz", root[k].hz);
+  }
+  if (differ)
+    printf(": by sampling at %g Hz with held inputs, not by the plant.\n", model->sample_rate);
+}
+
+static int emit_zeros(const tool *t, const pb_model *model, const pb_sampled_root *root,
+                      size_t count, const channels *ch) {
+  pb_error err = {0};
+  zero_list list;
+  if (!zero_list_fill(root, count, &list)) return tool_end(pb_fail_memory(&err, t->file), &err);
+  const column c[ZERO_COLUMNS] = {
+      {"zeros_hz", "frequency", "Hz", 7, list.value[0]},
+      {"damping", "damping", NULL, 4, list.value[1]},
+      {"real", "real part", "rad/s", 7, list.value[2]},
+      {"imag", "imaginary part", "rad/s", 7, list.value[3]},
+      {"sampled_hz", "sampled", "Hz", 7, list.value[4]},
+      {"sampled_damping", "sampled damping", NULL, 4, list.value[5]},
+      {"multiplicity", "multiplicity", NULL, 1, list.value[6]},
+  };
+  int code = emit_columns(
+      t, &(columns){.count = ZERO_COLUMNS, .rows = list.count, .column = c, .channels = ch});
+  if (!code && wants_table(t)) print_signs(model, root, count);
+  free(list.value[0]);
+  return code;
+}
+
+// Zeros of the chosen channel; beyond the size that can be treated whole only below Nyquist. They
+// are those of |s| up to --max-frequency.
 static pb_status find_zeros(const tool *t, const pb_model *model, const channels *ch,
-                            double complex **zero, size_t *zeros, pb_error *err) {
+                            pb_sampled_root **zero, size_t *zeros, pb_error *err) {
   *zero = NULL;
   if (ch->inputs != ch->outputs) {
     return pb_fail(err, PB_ERR_ARGUMENT, t->file,
@@ -121,20 +185,29 @@ static pb_status find_zeros(const tool *t, const pb_model *model, const channels
   }
   double band = t->max_frequency;
   if (band <= 0 && model->nx > PB_ZEROS_DIRECT) band = 0.5 * model->sample_rate;
-  return pb_model_zeros(model, ch->input, ch->output, ch->inputs, band, zero, zeros, err);
+  pb_status status =
+      pb_model_sampled_zeros(model, ch->input, ch->output, ch->inputs, band, zero, zeros, err);
+  size_t kept = 0;
+  for (size_t k = 0; !status && k < *zeros; k++)
+    if (t->max_frequency <= 0 || (*zero)[k].hz <= t->max_frequency) (*zero)[kept++] = (*zero)[k];
+  *zeros = kept;
+  return status;
 }
 
 static int plot_zeros(const tool *t, const pb_model *model, const channels *ch,
-                      const double complex *zero, size_t zeros) {
+                      const pb_sampled_root *root, size_t zeros) {
   char title[256];
   snprintf(title, sizeof title, "%s: %s%s → %s%s", model->name, ch->input_name[0],
            ch->inputs > 1 ? "…" : "", ch->output_name[0], ch->outputs > 1 ? "…" : "");
   pb_error err = {0};
   double complex *pole = malloc((model->nx + 1) * sizeof *pole);
-  pb_status status = pole ? PB_OK : pb_fail_memory(&err, t->file);
+  double complex *zero = malloc((zeros + 1) * sizeof *zero);
+  pb_status status = pole && zero ? PB_OK : pb_fail_memory(&err, t->file);
   if (!status) status = pb_model_poles(model, PB_CONTINUOUS, pole, &err);
+  for (size_t k = 0; !status && k < zeros; k++) zero[k] = root[k].s;
   int code = tool_end(status, &err);
   if (!code) code = plot_roots(t, title, pole, model->nx, zero, zeros);
+  free(zero);
   free(pole);
   return code;
 }
@@ -144,17 +217,11 @@ int command_zeros(const tool *t, const pb_model *model) {
   int code = channels_choose(t, model, true, &ch);
   if (code) return code;
   pb_error err = {0};
-  root_list list = {0};
-  double complex *zero = NULL;
+  pb_sampled_root *zero = NULL;
   size_t zeros = 0;
-  pb_status status = find_zeros(t, model, &ch, &zero, &zeros, &err);
-  if (!status && !root_list_fill(t, zero, zeros, model->sample_rate, &list)) {
-    status = pb_fail_memory(&err, t->file);
-  }
-  code = tool_end(status, &err);
-  if (!code) code = emit_roots(t, &list, &ch, "zeros_hz", "rad/s");
+  code = tool_end(find_zeros(t, model, &ch, &zero, &zeros, &err), &err);
+  if (!code) code = emit_zeros(t, model, zero, zeros, &ch);
   if (!code && t->out_format == FORMAT_PNG) code = plot_zeros(t, model, &ch, zero, zeros);
-  free(list.hz);
   free(zero);
   channels_free(&ch);
   return code;

@@ -220,3 +220,48 @@ done:
   free(wi);
   return st;
 }
+
+// ---- eigenvalues --------------------------------------------------------------------------------
+
+static void pair_poles(const double *a, double complex out[2]) {
+  double mean = 0.5 * (a[0] + a[3]), half = 0.5 * (a[0] - a[3]);
+  double discriminant = half * half + a[1] * a[2];
+  if (discriminant < 0) {
+    out[0] = mean + I * sqrt(-discriminant);
+    out[1] = conj(out[0]);
+    return;
+  }
+  // The larger root first; the other from the product, free of cancellation.
+  double root = mean < 0 ? mean - sqrt(discriminant) : mean + sqrt(discriminant);
+  out[0] = root;
+  out[1] = root != 0 ? (a[0] * a[3] - a[1] * a[2]) / root : 0;
+}
+
+static pb_status wide_poles(const double *a, size_t size, double complex *out, pb_error *err) {
+  int n = (int)size, one = 1, info = 0, lwork = 8 * n;
+  double none = 0;
+  double *copy = malloc(size * size * sizeof *copy), *work = malloc((size_t)lwork * sizeof *work);
+  double *wr = malloc(size * sizeof *wr), *wi = malloc(size * sizeof *wi);
+  pb_status st = PB_OK;
+  if (!copy || !work || !wr || !wi) {
+    st = pb_fail_memory(err, "");
+    goto done;
+  }
+  memcpy(copy, a, size * size * sizeof *copy);
+  dgeev_("N", "N", &n, copy, &n, wr, wi, &none, &one, &none, &one, work, &lwork, &info);
+  if (info) st = pb_fail(err, PB_ERR_NUMERIC, "", "the poles of a block did not converge");
+  for (size_t i = 0; i < size && !st; i++) out[i] = wr[i] + I * wi[i];
+done:
+  free(copy);
+  free(work);
+  free(wr);
+  free(wi);
+  return st;
+}
+
+pb_status pb_block_poles(size_t n, const double *a, double complex *out, pb_error *err) {
+  if (n > 2) return wide_poles(a, n, out, err);
+  if (n == 2) pair_poles(a, out);
+  if (n == 1) out[0] = a[0];
+  return PB_OK;
+}

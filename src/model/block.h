@@ -2,6 +2,7 @@
 #ifndef PB_MODEL_BLOCK_H
 #define PB_MODEL_BLOCK_H
 
+#include <complex.h>
 #include <stdbool.h>
 #include <stddef.h>
 
@@ -23,6 +24,10 @@ pb_status pb_block_diagonalize(size_t n, double *a, double *v, size_t *blocks, s
 // [0, 0]] with a [13/13] Padé approximant (Higham, SIAM J. Matrix Anal. Appl. 26, 2005). [init]
 pb_status pb_block_discretize(size_t n, const double *a, double h, double *ad, double *gd,
                               pb_error *err);
+
+// Eigenvalues of one block into out[n], conjugates adjacent; those of 2 × 2 blocks in closed form,
+// real ones to an accuracy of their own each. Fails with PB_ERR_NUMERIC, PB_ERR_MEMORY. [init]
+pb_status pb_block_poles(size_t n, const double *a, double complex *out, pb_error *err);
 
 // Whether none of n numbers is infinite or NaN. [any]
 bool pb_all_finite(const double *x, size_t n);

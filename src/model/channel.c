@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/lapack.h"
+#include "model/block.h"
 
 enum { SCALE_POINTS = 24 };
 
@@ -53,6 +54,7 @@ pb_status pb_channel_copy(const pb_channel *from, pb_channel *out, pb_error *err
   memcpy(out->c, from->c, n * m * sizeof *out->c);
   memcpy(out->d, from->d, m * m * sizeof *out->d);
   memcpy(out->radius, from->radius, from->blocks * sizeof *out->radius);
+  out->period = from->period;
   return PB_OK;
 }
 
@@ -113,13 +115,16 @@ static double add_block(const pb_channel *ch, size_t block, double complex s, do
 
 void pb_channel_evaluate(const pb_channel *ch, double complex s, double complex *h,
                          double complex *dh, double *size) {
+  const bool sampled = ch->period > 0;
+  const double complex p = sampled ? cexp(s * ch->period) : s, through = sampled ? 1 / p : 1;
   double total = 0;
   for (size_t k = 0; k < ch->m * ch->m; k++) {
-    h[k] = ch->d[k];
-    if (dh) dh[k] = 0;
-    total = fmax(total, fabs(ch->d[k]));
+    h[k] = ch->d[k] * through;
+    if (dh) dh[k] = sampled ? -h[k] * through : 0;
+    total = fmax(total, cabs(h[k]));
   }
-  for (size_t k = 0; k < ch->blocks; k++) total += add_block(ch, k, s, h, dh);
+  for (size_t k = 0; k < ch->blocks; k++) total += add_block(ch, k, p, h, dh);
+  for (size_t k = 0; dh && sampled && k < ch->m * ch->m; k++) dh[k] *= ch->period * p;
   *size = total;
 }
 
@@ -323,4 +328,45 @@ void pb_channel_keep(pb_channel *ch, const bool *keep, bool residual) {
   ch->blocks = kept;
   ch->start[kept] = ch->n = state;
   ch->value[kept] = value;
+}
+
+// ---- sampling -----------------------------------------------------------------------------------
+
+// A_b ← e^{A_b T}, B_b ← ∫₀ᵀ e^{A_b s} ds B_b; space: 2 size² + size × m.
+static pb_status sample_block(pb_channel *ch, size_t block, double period, double *space,
+                              pb_error *err) {
+  const size_t m = ch->m, first = ch->start[block], size = ch->start[block + 1] - first;
+  double *ad = space, *gd = ad + size * size, *x = gd + size * size;
+  double *a = &ch->a[ch->value[block]], *b = &ch->b[first * m];
+  pb_status st = pb_block_discretize(size, a, period, ad, gd, err);
+  if (st) return st;
+  memcpy(x, b, size * m * sizeof *x);
+  memcpy(a, ad, size * size * sizeof *a);
+  for (size_t k = 0; k < size * m; k++) {
+    b[k] = 0;
+    for (size_t j = 0; j < size; j++) b[k] += gd[k / m + j * size] * x[j * m + k % m];
+  }
+  return PB_OK;
+}
+
+pb_status pb_channel_sample(const pb_channel *channel, double period, pb_channel *out,
+                            pb_error *err) {
+  pb_status st = pb_channel_copy(channel, out, err);
+  if (st) return st;
+  const size_t wide = channel->widest;
+  double *space = malloc((2 * wide * wide + wide * channel->m + 1) * sizeof *space);
+  if (!space) st = pb_fail_memory(err, "zeros");
+  for (size_t k = 0; k < channel->blocks && !st; k++) st = sample_block(out, k, period, space, err);
+  out->period = period;
+  free(space);
+  return st;
+}
+
+pb_status pb_channel_poles(const pb_channel *ch, double complex *pole, pb_error *err) {
+  pb_status st = PB_OK;
+  for (size_t k = 0; k < ch->blocks && !st; k++) {
+    const size_t first = ch->start[k];
+    st = pb_block_poles(ch->start[k + 1] - first, &ch->a[ch->value[k]], pole + first, err);
+  }
+  return st;
 }

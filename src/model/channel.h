@@ -24,6 +24,7 @@ typedef struct pb_channel {
   double *b, *c;        // [n][m] each: row i of B, column i of C
   double *d;            // m × m
   double *radius;       // [blocks] |det A_b|^(1/size), rad/s: where the block resonates
+  double period;        // s; 0: continuous time
   double complex *work;
   int *pivot;
 } pb_channel;
@@ -34,6 +35,16 @@ typedef struct pb_channel {
 pb_status pb_channel_open(const pb_model *model, const size_t *input, const size_t *output,
                           size_t count, pb_channel *out, pb_error *err);
 void pb_channel_free(pb_channel *channel);
+
+// The same channel sampled: held inputs over `period` seconds, A_d, B_d, and D z⁻¹. What a sampled
+// channel is evaluated at is s with z = e^{sT}, and slopes are dH/ds. *out is freed with
+// pb_channel_free, also after a failure. Fails with PB_ERR_NUMERIC, PB_ERR_MEMORY. [init]
+pb_status pb_channel_sample(const pb_channel *channel, double period, pb_channel *out,
+                            pb_error *err);
+
+// Poles of a channel of continuous time, [n] in rad/s. Fails with PB_ERR_NUMERIC, PB_ERR_MEMORY.
+// [init]
+pb_status pb_channel_poles(const pb_channel *channel, double complex *pole, pb_error *err);
 
 // H and, when dh is not NULL, dH/ds at s. size: the sum of the terms' largest entries, against
 // which rounding errors of H count. Uses the channel's work space: one thread at a time. [init]

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "base/lapack.h"
+#include "model/block.h"
 #include "model/frf_pairs.h"
 #include "model/model.h"
 
@@ -212,42 +213,6 @@ pb_status pb_model_frf(const pb_model *m, pb_time_base base, const double *hz, s
   return st;
 }
 
-static void pair_poles(const double *a, double complex out[2]) {
-  double mean = 0.5 * (a[0] + a[3]), half = 0.5 * (a[0] - a[3]);
-  double discriminant = half * half + a[1] * a[2];
-  if (discriminant < 0) {
-    out[0] = mean + I * sqrt(-discriminant);
-    out[1] = conj(out[0]);
-    return;
-  }
-  // The larger root first; the other from the product, free of cancellation.
-  double root = mean < 0 ? mean - sqrt(discriminant) : mean + sqrt(discriminant);
-  out[0] = root;
-  out[1] = root != 0 ? (a[0] * a[3] - a[1] * a[2]) / root : 0;
-}
-
-static pb_status block_poles(const double *a, size_t size, double complex *out, pb_error *err) {
-  int n = (int)size, one = 1, info = 0, lwork = 8 * n;
-  double none = 0;
-  double *copy = malloc(size * size * sizeof *copy), *work = malloc((size_t)lwork * sizeof *work);
-  double *wr = malloc(size * sizeof *wr), *wi = malloc(size * sizeof *wi);
-  pb_status st = PB_OK;
-  if (!copy || !work || !wr || !wi) {
-    st = pb_fail_memory(err, "");
-    goto done;
-  }
-  memcpy(copy, a, size * size * sizeof *copy);
-  dgeev_("N", "N", &n, copy, &n, wr, wi, &none, &one, &none, &one, work, &lwork, &info);
-  if (info) st = pb_fail(err, PB_ERR_NUMERIC, "", "the poles of a block did not converge");
-  for (size_t i = 0; i < size && !st; i++) out[i] = wr[i] + I * wi[i];
-done:
-  free(copy);
-  free(work);
-  free(wr);
-  free(wi);
-  return st;
-}
-
 pb_status pb_model_poles(const pb_model *m, pb_time_base base, double complex *poles,
                          pb_error *err) {
   const double *values = choose(m, base).a;
@@ -255,12 +220,7 @@ pb_status pb_model_poles(const pb_model *m, pb_time_base base, double complex *p
   for (size_t k = 0; k < m->blocks && !st; k++) {
     size_t start = m->block_start[k], size = m->block_start[k + 1] - start;
     const double *a = values + m->block_value[k];
-    if (size == 1)
-      poles[start] = a[0];
-    else if (size == 2)
-      pair_poles(a, poles + start);
-    else
-      st = block_poles(a, size, poles + start, err);
+    st = pb_block_poles(size, a, poles + start, err);
   }
   return st;
 }

@@ -11,6 +11,7 @@
 //
 //   s ← s − (uᴴ H v) / (uᴴ H′ v)
 //
+// Zeros of higher order are counted afterwards (zeros_multiple.c).
 // Infinite eigenvalues that rounding made finite do not survive: at a genuine zero the rounding
 // error of H moves it by little, at those by as much as they are away. Source of the functional:
 // Schwetlick and Schreiber, "Nonlinear Rayleigh functionals", Linear Algebra Appl. 436 (2012).
@@ -21,22 +22,12 @@
 #include <stdlib.h>
 
 #include "base/lapack.h"
-#include "model/channel.h"
+#include "model/zeros_finder.h"
 
 static const double pi = 3.14159265358979323846;
 
 // A mode that contributes less than this part of H at its own resonance counts as not seen.
 static const double unseen = 1e-9;
-
-typedef struct finder {
-  const pb_channel *channel;               // the exact one
-  double slowest, middle;                  // smallest and mean |λ| of its blocks, rad/s
-  double reach;                            // how far polishing may move a candidate, relative
-  double complex *h, *dh, *u, *vh, *work;  // m × m; svd
-  double *sigma, *rwork;
-  double complex *zero;  // found: imaginary part ≥ 0, both of a pair stand for one entry
-  size_t count;
-} finder;
 
 // ---- the pencil ---------------------------------------------------------------------------------
 
@@ -84,126 +75,59 @@ static pb_status pencil_zeros(const pb_channel *ch, double w, double complex *s,
   return PB_OK;
 }
 
-// ---- polishing ----------------------------------------------------------------------------------
-
-// Singular values of h (destroyed) and the vectors of all of them.
-static bool decompose(finder *f) {
-  int m = (int)f->channel->m, lwork = 16 * m + 64, info = 0;
-  if (m == 1) {  // uᴴ h v = h: the plain Newton method
-    f->sigma[0] = cabs(f->h[0]);
-    f->u[0] = f->vh[0] = 1;
-    return true;
-  }
-  double complex *copy = f->work + lwork;
-  for (int k = 0; k < m * m; k++) copy[k] = f->h[k];
-  zgesvd_("A", "A", &m, &m, copy, &m, f->sigma, f->u, &m, f->vh, &m, f->work, &lwork, f->rwork,
-          &info);
-  return info == 0;
-}
-
-// u_kᴴ M v_k
-static double complex project(const finder *f, const double complex *matrix, size_t k) {
-  size_t m = f->channel->m;
-  double complex sum = 0;
-  for (size_t i = 0; i < m; i++) {
-    for (size_t o = 0; o < m; o++) {
-      sum += conj(f->u[k * m + o]) * matrix[i * m + o] * conj(f->vh[i * m + k]);
-    }
-  }
-  return sum;
-}
-
-// H, H′ and the decomposition at s; returns the Newton step of the smallest singular value and, in
-// *doubt, how far the rounding error of H may move the zero. false: nothing to divide by.
-static bool newton_step(finder *f, double complex s, double complex *step, double *doubt) {
-  double size;
-  size_t last = f->channel->m - 1;
-  pb_channel_evaluate(f->channel, s, f->h, f->dh, &size);
-  if (!isfinite(size) || !decompose(f)) return false;
-  double complex slope = project(f, f->dh, last);
-  if (slope == 0) return false;
-  *step = project(f, f->h, last) / slope;
-  *doubt = 1e-11 * size / cabs(slope);
-  return isfinite(cabs(*step));
-}
-
-static double scale_of(const finder *f, double complex s) {
-  return fmax(cabs(s), f->slowest);
-}
-
-// Moves *s onto the zero next to it; false: there is none.
-static bool polish(finder *f, double complex *s) {
-  double complex start = *s, at = start, step = 0;
-  double doubt = 0, last = INFINITY;
-  for (int turn = 0; turn < 60; turn++) {
-    if (!newton_step(f, at, &step, &doubt)) return false;
-    double length = cabs(step), scale = scale_of(f, at);
-    // The last digits of H are noise: no better once a small step does not shrink any more.
-    if (length <= 1e-15 * scale || (length < 1e-8 * scale && length > 0.5 * last)) break;
-    at -= step;
-    if (cimag(start) == 0) at = creal(at);
-    if (cabs(at - start) > f->reach * scale_of(f, start)) return false;
-    last = length;
-  }
-  *s = at;
-  return cabs(step) < 1e-7 * scale_of(f, at) && doubt < 1e-3 * scale_of(f, at);
-}
-
-// Two modes of one frequency are one to a single channel: between their poles, a rounding error
-// apart, H passes through 0, but a hair beside that it is not what its slope there says.
-static bool is_cancelled(finder *f, double complex s) {
-  double complex step, slope;
-  double doubt, hair = 1e-7 * scale_of(f, s);
-  size_t last = f->channel->m - 1;
-  if (!newton_step(f, s, &step, &doubt)) return false;
-  slope = project(f, f->dh, last);
-  if (!newton_step(f, s + hair, &step, &doubt)) return false;
-  return f->sigma[last] < 0.1 * cabs(slope) * hair;
-}
-
 // How many zeros lie at a polished one: the singular values that vanish there.
-static size_t multiplicity(finder *f, double complex s) {
+static size_t multiplicity(pb_zero_finder *f, double complex s) {
   double complex step;
   double doubt;
   size_t many = 0;
-  if (!newton_step(f, s, &step, &doubt)) return 1;
+  if (!pb_zero_step(f, s, &step, &doubt)) return 1;
   for (size_t k = 0; k < f->channel->m; k++) {
-    double slope = cabs(project(f, f->dh, k));
-    many += f->sigma[k] < 1e-6 * slope * scale_of(f, s);
+    double slope = cabs(pb_zero_project(f, f->dh, k));
+    many += f->sigma[k] < 1e-6 * slope * pb_zero_scale(f, s);
   }
   return many ? many : 1;
 }
 
 // At the origin H may vanish to second order (accelerations): H′ vanishes too and Newton's method
 // has nothing to divide by, so H itself is judged.
-static bool zero_at_origin(finder *f, double complex s) {
+static bool zero_at_origin(pb_zero_finder *f, double complex s) {
   double size, reference;
   if (cabs(s) > 1e-4 * f->slowest) return false;
   pb_channel_evaluate(f->channel, 0.5 * I * f->slowest, f->h, NULL, &reference);
   pb_channel_evaluate(f->channel, 0, f->h, NULL, &size);
-  return isfinite(size) && decompose(f) && f->sigma[f->channel->m - 1] < 1e-9 * reference;
+  return isfinite(size) && pb_zero_decompose(f) && f->sigma[f->channel->m - 1] < 1e-9 * reference;
 }
 
-static void accept(finder *f, double complex s) {
+// False: it is listed already.
+static bool accept(pb_zero_finder *f, double complex s) {
   size_t alike = 0;
   for (size_t k = 0; k < f->count; k++) {
-    alike += cabs(f->zero[k] - s) < 1e-6 * scale_of(f, s);
+    alike += cabs(f->zero[k] - s) < 1e-6 * pb_zero_scale(f, s);
   }
-  if (alike && s != 0 && alike >= multiplicity(f, s)) return;
+  if (alike && s != 0 && alike >= multiplicity(f, s)) return false;
   f->zero[f->count++] = s;
+  return true;
 }
 
-static void polish_all(finder *f, const double complex *candidate, size_t count, double band) {
+// Lists what the candidates lead to; those that lead nowhere new are left in the same list.
+// Returns how many they are.
+static size_t polish_all(pb_zero_finder *f, double complex *candidate, size_t count, double band) {
+  size_t lost = 0;
   for (size_t k = 0; k < count; k++) {
     double complex s = candidate[k];
     if (band > 0 && cimag(s) > 1.2 * band) continue;
     if (zero_at_origin(f, s)) {
       accept(f, 0);
       if (cimag(s) > 0) accept(f, 0);
-    } else if (polish(f, &s) && (band <= 0 || cimag(s) <= band) && !is_cancelled(f, s)) {
-      accept(f, s);
+      continue;
+    }
+    if (!pb_zero_polish(f, &s)) {
+      candidate[lost++] = s;
+    } else if ((band <= 0 || cimag(s) <= band) && !pb_zero_cancelled(f, s)) {
+      if (!accept(f, s)) candidate[lost++] = s;
     }
   }
+  return lost;
 }
 
 // ---- preparing ----------------------------------------------------------------------------------
@@ -218,27 +142,12 @@ static int compare_zero(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-static void measure_blocks(const pb_channel *ch, double *slowest, double *middle) {
-  double sum = 0;
-  size_t count = 0;
-  *slowest = INFINITY;
-  for (size_t k = 0; k < ch->blocks; k++) {
-    if (!(ch->radius[k] > 0)) continue;
-    *slowest = fmin(*slowest, ch->radius[k]);
-    sum += log(ch->radius[k]);
-    count++;
-  }
-  *middle = count ? exp(sum / (double)count) : 1;
-  if (!count) *slowest = 1;
-}
-
-// Removes the modes that this channel does not see: each would be a zero on top of its own pole.
-static pb_status drop_unseen(pb_channel *ch, pb_error *err) {
+pb_status pb_channel_drop_unseen(pb_channel *ch, pb_error *err) {
   bool *keep = calloc(ch->blocks + 1, sizeof *keep);
   double complex *h = malloc(ch->m * ch->m * sizeof *h);
   double slowest, middle, size;
   pb_status status = keep && h ? PB_OK : pb_fail_memory(err, "zeros");
-  measure_blocks(ch, &slowest, &middle);
+  pb_channel_measure(ch, &slowest, &middle);
   for (size_t k = 0; !status && k < ch->blocks; k++) {
     // A hair off the axis: an undamped mode is infinite on it.
     double complex s = (1e-8 + I) * (ch->radius[k] > 0 ? ch->radius[k] : 1e-3 * slowest);
@@ -272,12 +181,13 @@ static pb_status cut(pb_channel *ch, double band, pb_error *err) {
 }
 
 // H that is singular wherever one looks has no zeros but only rank.
-static pb_status refuse_singular(finder *f, pb_error *err) {
+static pb_status refuse_singular(pb_zero_finder *f, pb_error *err) {
   for (int k = 0; k < 5; k++) {
     double size;
     double complex s = f->middle * cexp(I * (0.3 + 0.25 * k)) * (0.5 + 0.4 * k);
     pb_channel_evaluate(f->channel, s, f->h, NULL, &size);
-    if (!decompose(f)) return pb_fail(err, PB_ERR_NUMERIC, "zeros", "H has no singular values");
+    if (!pb_zero_decompose(f))
+      return pb_fail(err, PB_ERR_NUMERIC, "zeros", "H has no singular values");
     if (f->sigma[f->channel->m - 1] > 1e-11 * size) return PB_OK;
   }
   return pb_fail(err, PB_ERR_SINGULAR, "zeros",
@@ -286,30 +196,9 @@ static pb_status refuse_singular(finder *f, pb_error *err) {
 
 // ---- together -----------------------------------------------------------------------------------
 
-static bool finder_open(finder *f, const pb_channel *channel) {
-  size_t m = channel->m, work = 16 * m + 64 + m * m;
-  *f = (finder){.channel = channel, .reach = 1e-2};
-  f->h = calloc(4 * m * m + work, sizeof *f->h);
-  f->sigma = calloc(m + 5 * m, sizeof *f->sigma);
-  f->zero = calloc(2 * (channel->n + m) + 2, sizeof *f->zero);
-  if (!f->h || !f->sigma || !f->zero) return false;
-  f->dh = f->h + m * m;
-  f->u = f->dh + m * m;
-  f->vh = f->u + m * m;
-  f->work = f->vh + m * m;
-  f->rwork = f->sigma + m;
-  measure_blocks(channel, &f->slowest, &f->middle);
-  return true;
-}
-
-static void finder_close(finder *f) {
-  free(f->h);
-  free(f->sigma);
-  free(f->zero);
-}
-
 // Sorted, each pair as two conjugates, in memory of its own.
-static pb_status hand_over(finder *f, double complex **zeros, size_t *count, pb_error *err) {
+static pb_status hand_over(pb_zero_finder *f, double complex **zeros, size_t *count,
+                           pb_error *err) {
   double complex *out = malloc((2 * f->count + 1) * sizeof *out);
   if (!out) return pb_fail_memory(err, "zeros");
   qsort(f->zero, f->count, sizeof *f->zero, compare_zero);
@@ -324,7 +213,7 @@ static pb_status hand_over(finder *f, double complex **zeros, size_t *count, pb_
   return PB_OK;
 }
 
-static pb_status find(finder *f, double band, pb_error *err) {
+static pb_status find(pb_zero_finder *f, double band, pb_error *err) {
   pb_channel reduced = {0};
   double complex *candidate = NULL;
   size_t count;
@@ -341,7 +230,10 @@ static pb_status find(finder *f, double band, pb_error *err) {
     if (!candidate) status = pb_fail_memory(err, "zeros");
   }
   if (!status) status = pencil_zeros(source, f->middle, candidate, &count, err);
-  if (!status) polish_all(f, candidate, count, band);
+  if (!status) {
+    count = polish_all(f, candidate, count, band);
+    status = pb_zeros_recover(f, candidate, count, band, err);
+  }
   free(candidate);
   pb_channel_free(&reduced);
   return status;
@@ -351,23 +243,23 @@ pb_status pb_model_zeros(const pb_model *model, const size_t *input, const size_
                          size_t count, double max_hz, double complex **zeros, size_t *zero_count,
                          pb_error *err) {
   pb_channel channel;
-  finder f = {0};
+  pb_zero_finder f = {0};
   *zeros = NULL;
   *zero_count = 0;
   if (!(isfinite(max_hz) && max_hz >= 0)) {
     return pb_fail(err, PB_ERR_ARGUMENT, "zeros", "the band must be a frequency, or 0 for all");
   }
   pb_status status = pb_channel_open(model, input, output, count, &channel, err);
-  if (!status) status = drop_unseen(&channel, err);
+  if (!status) status = pb_channel_drop_unseen(&channel, err);
   if (!status && channel.n > PB_ZEROS_DIRECT && max_hz == 0) {
     status =
         pb_fail(err, PB_ERR_ARGUMENT, "zeros",
                 "%zu states are too many to find all zeros; give a highest frequency", channel.n);
   }
-  if (!status && !finder_open(&f, &channel)) status = pb_fail_memory(err, "zeros");
+  if (!status && !pb_zero_finder_open(&f, &channel)) status = pb_fail_memory(err, "zeros");
   if (!status) status = find(&f, 2 * pi * max_hz, err);
   if (!status) status = hand_over(&f, zeros, zero_count, err);
-  finder_close(&f);
+  pb_zero_finder_close(&f);
   pb_channel_free(&channel);
   return status;
 }

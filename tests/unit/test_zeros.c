@@ -1,14 +1,10 @@
 // Transmission zeros of models whose zeros are known in closed form or by interlacing.
 #include "model/zeros.h"
 
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "assembly/system.h"
+#include "model/sampled_roots.h"
+#include "plant/plant.h"
+#include "support/check.h"
 
 // A model of second-order blocks in companion form, [0 1; −w² −2ζw]; only what the zeros need.
 typedef struct sketch {
@@ -307,13 +303,159 @@ static void test_refusals(void **state) {
   sketch_free(&k);
 }
 
+// ---- zeros of higher order ----------------------------------------------------------------------
+
+// Masses on vertical guides: a chain from the ground through masses of 1 kg with 1e4 N/m and
+// 10 Ns/m, and on each of them an absorber of 0.1 kg with 400 N/m and 0.2 Ns/m, or none.
+static pb_model *chain(size_t masses, bool absorbers) {
+  char text[8192], *at = text;
+  const char *sep = "";
+  at += sprintf(at, "{\"schema\": \"plantbus.plant/1\", \"name\": \"chain\", \"sample_rate\": "
+                    "10000, \"components\": {");
+  for (size_t k = 0; k < masses * (absorbers ? 2 : 1); k++, sep = ",")
+    at += sprintf(at, "%s \"m%zu\": {\"type\": \"rigid_body\", \"mass\": %s, \"inertia\": [1,1,1]}",
+                  sep, k, k < masses ? "1" : "0.1");
+  at += sprintf(at, "}, \"connections\": {");
+  sep = "";
+  for (size_t k = 0; k < masses * (absorbers ? 2 : 1); k++, sep = ",") {
+    char from[16] = "ground";
+    if (k >= masses)
+      sprintf(from, "m%zu", k - masses);
+    else if (k > 0)
+      sprintf(from, "m%zu", k - 1);
+    at += sprintf(at,
+                  "%s \"j%zu\": {\"from\": \"%s\", \"to\": \"m%zu\", \"joint\": {\"type\": "
+                  "\"prismatic\", \"k_a\": %s}}",
+                  sep, k, from, k, k < masses ? "1e4, \"c_a\": 10" : "400, \"c_a\": 0.2");
+  }
+  sprintf(at,
+          "}, \"inputs\": [{\"name\": \"F\", \"type\": \"force\", \"frame\": \"m0\", "
+          "\"direction\": [0,0,1]}], \"outputs\": [{\"name\": \"y\", \"type\": \"displacement\", "
+          "\"frame\": \"m%zu\", \"direction\": [0,0,1]}]}",
+          masses - 1);
+  pb_plant *plant = NULL;
+  pb_system *system = NULL;
+  pb_model *model = NULL;
+  REQUIRE(pb_plant_parse(text, strlen(text), NULL, NULL, &plant, &err));
+  REQUIRE(pb_system_assemble(plant, NULL, &system, &err));
+  REQUIRE(pb_model_compile(system, NULL, &model, &err));
+  pb_system_free(system);
+  pb_plant_free(plant);
+  return model;
+}
+
+// From the first mass to the last but through every spring between: (c s + k) for each of them, and
+// for each absorber m s² + c s + k, all at the same places.
+static void check_chain(size_t masses, bool absorbers) {
+  const size_t order[1] = {0};
+  const double complex absorber = -1 + I * sqrt(3999);
+  pb_model *model = chain(masses, absorbers);
+  pb_sampled_root *root;
+  size_t count, at = 0;
+  result r = find_zeros(model, 1, 0);
+  assert_int_equal(r.count, masses - 1 + (absorbers ? 2 * masses : 0));
+  for (size_t k = 0; absorbers && k < masses; k++, at += 2) {
+    check_zero(r.zero[at], absorber, 1e-12);
+    check_zero(r.zero[at + 1], conj(absorber), 1e-12);
+  }
+  for (; at < r.count; at++) {
+    check_zero(r.zero[at], -1000, 1e-9);
+    assert_true(cimag(r.zero[at]) == 0);
+  }
+  free(r.zero);
+  REQUIRE(pb_model_sampled_zeros(model, order, order, 1, 0, &root, &count, &err));
+  assert_int_equal(count, masses - 1 + (absorbers ? masses : 0));
+  for (size_t k = 0; k < count; k++) {
+    assert_int_equal(root[k].multiplicity, absorbers && k < masses ? masses : masses - 1);
+    assert_true(root[k].has_sampled && !root[k].sign_differs);
+  }
+  free(root);
+  pb_model_free(model);
+}
+
+static void test_multiple(void **state) {
+  (void)state;
+  check_chain(2, false);
+  check_chain(3, false);
+  check_chain(2, true);
+  check_chain(3, true);
+}
+
+// ---- the sampled plant --------------------------------------------------------------------------
+
+// The response vanishes at each sampled zero, and no two of them are the same.
+static void check_sampled(const pb_model *model, size_t input, size_t output,
+                          const pb_sampled_root *root, size_t count) {
+  const size_t entries = model->nu * model->ny, at = output * model->nu + input;
+  double complex *h = malloc(2 * entries * sizeof *h), *dh = h + entries;
+  for (size_t k = 0; k < count; k++) {
+    if (!root[k].has_sampled) continue;
+    pb_model_evaluate(model, PB_SAMPLED, root[k].z, h, dh);
+    // Newton's step from there, by another sum that rounds by 1e-8 of |z − 1| at most.
+    assert_true(cabs(h[at] / dh[at]) < 1e-7 * cabs(root[k].z - 1));
+    for (size_t i = 0; i < k; i++) assert_true(root[i].z != root[k].z);
+  }
+  free(h);
+}
+
+// The hexapod of elements: the strut's force sensor has its zeros on the left, and sampling at
+// 10 kHz moves the three slowest to the right (figures of an independent recomputation).
+static void test_sampled_signs(void **state) {
+  (void)state;
+  static const double hz[] = {23.45, 68.10, 104.05}, damping[] = {0.00107, 0.00238, 0.00358},
+                      sampled[] = {-0.0092, -0.00125, -0.00040};
+  pb_model *model = NULL;
+  pb_sampled_root *root;
+  size_t count;
+  REQUIRE(pb_model_load(PB_CONFIG "/plants/nano-hexapod-elements.json", NULL, &model, &err));
+  const size_t input = (size_t)pb_model_input(model, "Va1"),
+               output = (size_t)pb_model_output(model, "Vs1");
+  REQUIRE(pb_model_sampled_zeros(model, &input, &output, 1, 1000, &root, &count, &err));
+  assert_true(count > 5);
+  for (size_t k = 0; k < 3; k++) {
+    ASSERT_NEAR(root[k].hz, hz[k], 0.006);
+    ASSERT_NEAR(root[k].damping, damping[k], 6e-6);
+    ASSERT_NEAR(root[k].sampled_damping, sampled[k], 5e-5);
+    assert_true(root[k].has_sampled && root[k].sign_differs);
+  }
+  for (size_t k = 3; k < count; k++) {
+    assert_true(root[k].has_sampled == (root[k].hz < 5000));
+    assert_false(root[k].sign_differs);
+  }
+  check_sampled(model, input, output, root, count);
+  free(root);
+  pb_model_free(model);
+}
+
+// Poles have z = e^{sT} and no other damping; above Nyquist only an alias.
+static void test_sampled_poles(void **state) {
+  (void)state;
+  sketch k = sketch_new(2, 1, 1);
+  k.model.sample_rate = 1000;
+  add_mode(&k, 2 * M_PI * 100, 0.01, 1, 0, NULL, NULL);
+  add_mode(&k, 2 * M_PI * 900, 0.02, 1, 0, NULL, NULL);
+  pb_sampled_root *root;
+  size_t count;
+  REQUIRE(pb_model_sampled_poles(&k.model, 0, &root, &count, &err));
+  assert_int_equal(count, 2);
+  ASSERT_RELATIVE(root[0].sampled_hz, 100, 1e-12);
+  ASSERT_RELATIVE(root[0].sampled_damping, 0.01, 1e-12);
+  assert_true(root[0].has_sampled && !root[0].sign_differs);
+  ASSERT_RELATIVE(root[1].hz, 900, 1e-12);
+  assert_true(!root[1].has_sampled && root[1].sampled_hz < 500);
+  free(root);
+  sketch_free(&k);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_biquad),      cmocka_unit_test(test_no_zeros),
-      cmocka_unit_test(test_far_zero),    cmocka_unit_test(test_origin),
-      cmocka_unit_test(test_unseen),      cmocka_unit_test(test_double_mode),
-      cmocka_unit_test(test_interlacing), cmocka_unit_test(test_large),
-      cmocka_unit_test(test_square),      cmocka_unit_test(test_refusals),
+      cmocka_unit_test(test_biquad),        cmocka_unit_test(test_no_zeros),
+      cmocka_unit_test(test_far_zero),      cmocka_unit_test(test_origin),
+      cmocka_unit_test(test_unseen),        cmocka_unit_test(test_double_mode),
+      cmocka_unit_test(test_interlacing),   cmocka_unit_test(test_large),
+      cmocka_unit_test(test_square),        cmocka_unit_test(test_multiple),
+      cmocka_unit_test(test_sampled_signs), cmocka_unit_test(test_sampled_poles),
+      cmocka_unit_test(test_refusals),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
