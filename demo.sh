@@ -91,10 +91,10 @@ identify_and_damp() {
   echo "== identification: band-limited noise over the bus, repeated so that nothing leaks"
   input=$(build/bin/plantbus-model info --json "$1" | sed -n 's/.*"inputs": *\["\([^"]*\)".*/\1/p')
   on_one build/bin/plantbus-identify --domain $domain --excitation periodic-noise --band 1,500 \
-    --resolution 0.25 --input "$input" --plot -o out
+    --resolution 0.25 --input "$input" --plot --output-dir out
   echo
   echo "== integral force feedback, at the gain with the most damping"
-  on_one build/bin/plantbus-iff --domain $domain --gain auto --plot -o out
+  on_one build/bin/plantbus-iff --domain $domain --gain auto --plot --output-dir out
   echo
   stop
 }
@@ -107,7 +107,7 @@ if [ -z "$plant" ]; then
   mkdir -p out/hexapod
   serve config/plants/nano-hexapod-elements.json
   on_one build/bin/plantbus-identify --domain $domain --blocks --excitation periodic-noise \
-    --input Va1 --output Vs1,dL1 --band 10,500 --resolution 0.5 --plot -o out/hexapod
+    --input Va1 --output Vs1,dL1 --band 10,500 --resolution 0.5 --plot --output-dir out/hexapod
   echo
   stop
 fi

@@ -18,12 +18,16 @@ enum {
   KEY_CPU,
   KEY_LOCK_MEMORY,
   KEY_OVERRUN,
+  KEY_PLANT,
   KEY_STATE,
   KEY_RESTORE
 };
 
 static const struct argp_option option_list[] = {
-    {"plant", 'p', "FILE", 0, "Plant file to serve", 0},
+    {"plant", KEY_PLANT, "FILE", 0, "Plant file to serve; or FILE alone", 0},
+    // Older command lines; -p is the name of a plant in every client, and one letter means one
+    // thing.
+    {NULL, 'p', "FILE", OPTION_HIDDEN, NULL, 0},
     {"mode", 'm', "MODE", 0, "lockstep (default), realtime or paused", 0},
     {"speed", KEY_SPEED, "X", 0, "Real time: plant seconds per second (default 1)", 0},
     {"lease", KEY_LEASE, "S", 0,
@@ -93,6 +97,7 @@ static error_t parse_network(int key, char *arg, struct argp_state *state,
 static error_t parse(int key, char *arg, struct argp_state *state) {
   pb_daemon_options *options = state->input;
   switch (key) {
+  case KEY_PLANT:
   case 'p':
     options->plant = arg;
     return 0;
@@ -127,10 +132,12 @@ static error_t parse(int key, char *arg, struct argp_state *state) {
     options->allow_shutdown = true;
     return 0;
   case ARGP_KEY_ARG:
-    argp_error(state, "unexpected argument '%s'", arg);
+    if (options->plant)
+      argp_error(state, "unexpected argument '%s': one plant file is served", arg);
+    options->plant = arg;
     return 0;
   case ARGP_KEY_END:
-    if (!options->plant) argp_error(state, "--plant is missing");
+    if (!options->plant) argp_error(state, "no plant file is named: plantbusd [OPTION...] FILE");
     if (options->config && options->interface)
       argp_error(state, "--interface has no meaning with --config, which names the interface");
     return 0;
@@ -143,7 +150,7 @@ void pb_options_parse(int argc, char **argv, pb_daemon_options *options) {
   static const struct argp argp = {
       option_list,
       parse,
-      NULL,
+      "FILE",
       "Serves a plant model on DDS: steps it in lockstep with its clients or in real time.",
       NULL,
       NULL,

@@ -12,8 +12,7 @@
 static const double patience = 60;  // seconds for a model to be compiled and swapped in
 
 static pb_session_options session_of(const boundary_options *o) {
-  const pb_common_options *common = &o->subject.live.common;
-  return (pb_session_options){.domain = common->domain, .plant = common->plant};
+  return pb_common_session(&o->subject.live.common);
 }
 
 static pb_status configure(const boundary_options *o, const cJSON *body, pb_error *err) {

@@ -161,7 +161,7 @@ int command_characterize(int argc, char **argv) {
       "experiment on a running bench tells.\n\n"
       "Exit codes: 0 done, 1 failed, 2 wrong command line.\n\n"
       "Examples:\n"
-      "  plantbus-actuator characterize APA300ML.mat --datasheet APA300ML --plot -o out\n"
+      "  plantbus-actuator characterize APA300ML.mat --datasheet APA300ML --plot --output-dir out\n"
       "  plantbus-actuator characterize config/plants/nano-hexapod.json --length 0.03\n",
       children,
       NULL,

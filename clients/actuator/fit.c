@@ -220,7 +220,7 @@ int command_fit(int argc, char **argv) {
       "g_a and g_s from the gains at 0 Hz; then, with --refine, least squares.\n\n"
       "Exit codes: 0 done, 1 failed, 2 wrong command line.\n\n"
       "Examples:\n"
-      "  plantbus-actuator fit APA300ML.mat --load 5 --plot -o out --write apa.json\n"
+      "  plantbus-actuator fit APA300ML.mat --load 5 --plot --output-dir out --write apa.json\n"
       "  plantbus-actuator fit --frf out/identify.mat --refine 5,300\n"
       "  plantbus-actuator fit --live\n",
       children,

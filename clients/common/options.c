@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "session.h"
+
 const char *argp_program_version = "plantbus " PB_VERSION;
 
 error_t pb_options_parse(const struct argp *argp, int argc, char **argv, void *input) {
@@ -164,10 +166,15 @@ void pb_option_frames(const struct argp_state *state, const char *flag, const ch
   if (!good) argp_error(state, "%s: '%s' is not %s", flag, text, expected);
 }
 
-// ---- --domain and --plant -----------------------------------------------------------------------
+// ---- where the plant is -------------------------------------------------------------------------
+
+enum { KEY_INTERFACE = 0x700, KEY_CONFIG };
 
 static const struct argp_option common_option[] = {
     {"domain", 'd', "N", 0, "DDS domain (default 0)", 0},
+    {"interface", KEY_INTERFACE, "NAME", 0,
+     "Network interface, as of the daemon (default lo: this host only)", 0},
+    {"config", KEY_CONFIG, "FILE", 0, "Cyclone DDS configuration; else CYCLONEDDS_URI", 0},
     {"plant", 'p', "NAME", 0, "Plant to talk to (default: the only one of the domain)", 0},
     {0},
 };
@@ -182,9 +189,26 @@ static error_t parse_common(int key, char *arg, struct argp_state *state) {
     if (!arg[0]) argp_error(state, "--plant: the name is empty");
     options->plant = arg;
     return 0;
+  case KEY_INTERFACE:
+    options->interface = arg;
+    return 0;
+  case KEY_CONFIG:
+    options->config = arg;
+    return 0;
+  case ARGP_KEY_END:
+    if (options->config && options->interface)
+      argp_error(state, "--interface has no meaning with --config, which names the interface");
+    return 0;
   default:
     return ARGP_ERR_UNKNOWN;
   }
+}
+
+pb_session_options pb_common_session(const pb_common_options *options) {
+  return (pb_session_options){.domain = options->domain,
+                              .config = options->config,
+                              .interface = options->interface,
+                              .plant = options->plant};
 }
 
 const struct argp pb_common_argp = {.options = common_option, .parser = parse_common};

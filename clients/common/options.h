@@ -65,14 +65,22 @@ void pb_option_direction(const struct argp_state *state, const char *flag, const
 void pb_option_frames(const struct argp_state *state, const char *flag, const char *text,
                       size_t frames[2]);
 
-// --domain N and --plant NAME, for tools that talk to a daemon. Use pb_common_argp as an argp child
-// and hand it a pb_common_options as its input (state->child_inputs[...]) on ARGP_KEY_INIT.
+// --domain N, --interface NAME, --config FILE (one of these two) and --plant NAME, for tools that
+// talk to a daemon. Use pb_common_argp as an argp child and hand it a pb_common_options as its
+// input (state->child_inputs[...]) on ARGP_KEY_INIT.
 typedef struct pb_common_options {
   uint32_t domain;
-  const char *plant;  // NULL: the only plant of the domain
+  const char *config, *interface;  // NULL: not given
+  const char *plant;               // NULL: the only plant of the domain
 } pb_common_options;
 
 extern const struct argp pb_common_argp;
+
+struct pb_session_options;
+
+// How a tool with these options opens its session; fill in what else it wants. session.h has the
+// type. [any]
+struct pb_session_options pb_common_session(const pb_common_options *options);
 
 // "plantbus-x: where: message" on stream (stderr as a rule). [any]
 void pb_print_error(FILE *stream, const pb_error *err);

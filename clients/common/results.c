@@ -8,11 +8,13 @@
 
 #include "outfile.h"
 
-enum { KEY_JSON = 0x600, KEY_PLOT };
+enum { KEY_JSON = 0x600, KEY_PLOT, KEY_DIR };
 
 static const struct argp_option option_table[] = {
     {"json", KEY_JSON, NULL, 0, "Print JSON instead of tables", 1},
-    {"output-dir", 'o', "DIR", 0, "Write CSV and MAT files into DIR", 1},
+    {"output-dir", KEY_DIR, "DIR", 0, "Write CSV and MAT files into DIR", 1},
+    // Older command lines; -o is a file elsewhere, and one letter means one thing.
+    {NULL, 'o', "DIR", OPTION_HIDDEN, NULL, 1},
     {"plot", KEY_PLOT, NULL, 0, "Draw plots (PNG) into DIR, or here", 1},
     {0},
 };
@@ -23,6 +25,7 @@ static error_t parse(int key, char *text, struct argp_state *state) {
   case KEY_JSON:
     o->json = true;
     return 0;
+  case KEY_DIR:
   case 'o':
     if (!text[0]) argp_error(state, "--output-dir: the name is empty");
     o->dir = text;
@@ -38,7 +41,10 @@ static error_t parse(int key, char *text, struct argp_state *state) {
 // argp frees what is not the text that it handed over.
 static char *help(int key, const char *text, void *input) {
   const pb_result_options *o = input;
-  const char *own = !o ? NULL : key == 'o' ? o->files_help : key == KEY_PLOT ? o->plot_help : NULL;
+  const char *own = !o                ? NULL
+                    : key == KEY_DIR  ? o->files_help
+                    : key == KEY_PLOT ? o->plot_help
+                                      : NULL;
   return own ? strdup(own) : (char *)text;
 }
 

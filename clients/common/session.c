@@ -33,7 +33,8 @@ static pb_status identity_make(pb_session *s, pb_error *err) {
 }
 
 static pb_status join(pb_session *s, pb_error *err) {
-  const pb_domain_options options = {.domain = s->domain};
+  const pb_domain_options options = {
+      .domain = s->domain, .config = s->config, .interface = s->interface};
   pb_status status = pb_domain_join(&options, &s->participant, err);
   for (int t = 0; !status && t < PB_TOPIC_COUNT; t++) {
     s->topic[t] = pb_topic_create(s->participant, (pb_topic)t);
@@ -91,6 +92,8 @@ static pb_session *session_new(const pb_session_options *options) {
   pb_session *s = calloc(1, sizeof *s);
   if (!s) return NULL;
   s->domain = options ? options->domain : 0;
+  s->config = options ? options->config : NULL;
+  s->interface = options ? options->interface : NULL;
   s->timeout = options && options->timeout > 0.0 ? options->timeout : 5.0;
   s->history = options ? (int)options->history : 0;
   pthread_condattr_t attr;

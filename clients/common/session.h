@@ -16,7 +16,9 @@
 typedef struct pb_session pb_session;
 
 typedef struct pb_session_options {
-  uint32_t domain;  // DDS domain id
+  uint32_t domain;        // DDS domain id
+  const char *config;     // file of a Cyclone DDS configuration; NULL: as bus_domain.h says
+  const char *interface;  // network interface of the built-in configuration; NULL: lo
   const char
       *plant;  // name of the plant; NULL: the only plant of the domain (several: refused, named)
   double timeout;    // seconds to wait for the daemon; 0: 5 s

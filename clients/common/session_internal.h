@@ -33,6 +33,7 @@ typedef struct pb_run {
 
 struct pb_session {
   uint32_t domain;
+  const char *config, *interface;  // the caller's: read while the session is opened
   double timeout;
   int history;           // samples that the reader keeps; 0: as its topic says
   uint8_t client[16];    // GUID of the participant

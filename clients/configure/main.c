@@ -167,8 +167,8 @@ int main(int argc, char **argv) {
   protect_numbers(argc, argv);
   pb_options_parse(&argp, argc, argv, &options);
   pb_interrupt_install();
-  const pb_session_options session_options = {
-      .domain = options.common.domain, .plant = options.common.plant, .timeout = options.timeout};
+  pb_session_options session_options = pb_common_session(&options.common);
+  session_options.timeout = options.timeout;
   pb_status status = pb_session_open(&session_options, &session, &err);
   if (!status) status = run_command(&options, session, &err);
   pb_session_close(session);

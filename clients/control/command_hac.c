@@ -11,7 +11,7 @@ static const char description[] =
     "an unstable one nothing is exported and the exit code is 1.\n\n"
     "Exit codes: 0 done, 1 failed or unstable, 2 wrong command line.\n\n"
     "Examples:\n"
-    "  plantbus-control hac nano-hexapod.json --bandwidth 100 --plot -o out\n"
+    "  plantbus-control hac nano-hexapod.json --bandwidth 100 --plot --output-dir out\n"
     "  plantbus-control hac nano-hexapod.json --frame cartesian --bandwidth 60 --lead 4\n"
     "  plantbus-control hac --live --bandwidth 100 --json\n";
 

@@ -17,7 +17,7 @@ static const char description[] =
     "written too, as the body of a host_controller request.\n\n"
     "Exit codes: 0 done, 1 failed, 2 wrong command line.\n\n"
     "Examples:\n"
-    "  plantbus-control iff nano-hexapod.json --plot -o out\n"
+    "  plantbus-control iff nano-hexapod.json --plot --output-dir out\n"
     "  plantbus-control iff --live --band 5,250\n";
 
 static error_t parse(int key, char *text, struct argp_state *state) {

@@ -15,7 +15,7 @@ static const char description[] =
     "reported. The design is that of plantbus-control hac.\n\n"
     "Exit codes: 0 done, 1 failed or predicted to be unstable, 2 wrong command line.\n\n"
     "Examples:\n"
-    "  plantbus-control run --bandwidth 100 --plot -o out\n"
+    "  plantbus-control run --bandwidth 100 --plot --output-dir out\n"
     "  plantbus-control run --bandwidth 60 --frame cartesian --disturbance Fx,Fz --rms 0.1\n";
 
 static error_t parse(int key, char *text, struct argp_state *state) {

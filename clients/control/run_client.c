@@ -60,8 +60,8 @@ pb_status hac_client_start(const control_design *d, bool realtime, hac_client **
   c->x = calloc(d->hac.nx + 1, sizeof *c->x);
   c->scratch = calloc(d->hac.nx + 1, sizeof *c->scratch);
   c->y = calloc(d->n, sizeof *c->y);
-  const pb_session_options options = {.domain = d->options->iff.common.domain,
-                                      .plant = d->plant->bench.description->name};
+  pb_session_options options = pb_common_session(&d->options->iff.common);
+  options.plant = d->plant->bench.description->name;
   pb_status status = c->x && c->scratch && c->y ? pb_session_open(&options, &c->session, err)
                                                 : pb_fail_memory(err, "hac");
   if (status == PB_OK) status = attach(c, realtime, err);

@@ -12,7 +12,7 @@ static const dds_duration_t tick = DDS_MSECS(50);
 bool doctor_join(doctor *d) {
   const doctor_options *o = d->options;
   const pb_domain_options options = {
-      .domain = o->common.domain, .config = o->config, .interface = o->interface};
+      .domain = o->common.domain, .config = o->common.config, .interface = o->common.interface};
   pb_error err = {0};
   pb_status status = pb_domain_join(&options, &d->participant, &err);
   for (int t = 0; !status && t < PB_TOPIC_COUNT; t++) {

@@ -10,8 +10,7 @@
 
 typedef struct doctor_options {
   pb_common_options common;
-  const char *config, *interface;  // as of the daemon; NULL: not given
-  double timeout;                  // s
+  double timeout;  // s
   bool json, scan;
   uint32_t scan_first, scan_last;
 } doctor_options;

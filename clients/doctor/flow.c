@@ -17,8 +17,9 @@ typedef struct watch {
 } watch;
 
 static void ping(doctor *d, const char *plant) {
-  const pb_session_options options = {
-      .domain = d->options->common.domain, .plant = plant, .timeout = d->options->timeout};
+  pb_session_options options = pb_common_session(&d->options->common);
+  options.plant = plant;
+  options.timeout = d->options->timeout;
   pb_session *session = NULL;
   pb_error err = {0};
   pb_status status = pb_session_open(&options, &session, &err);

@@ -22,10 +22,10 @@ bool doctor_configuration(doctor *d) {
   const char *uri = getenv("CYCLONEDDS_URI");
   char builtin[2048];
   pb_error err = {0};
-  const bool environment = !o->config && !o->interface && uri && *uri;
-  const char *source = o->config ? "--config" : environment ? "CYCLONEDDS_URI" : "built-in";
-  pb_domain_config(o->interface, builtin, sizeof builtin);
-  const char *text = o->config ? o->config : environment ? uri : builtin;
+  const bool environment = !o->common.config && !o->common.interface && uri && *uri;
+  const char *source = o->common.config ? "--config" : environment ? "CYCLONEDDS_URI" : "built-in";
+  pb_domain_config(o->common.interface, builtin, sizeof builtin);
+  const char *text = o->common.config ? o->common.config : environment ? uri : builtin;
   if (config_read(text, &d->facts, &err)) {
     report_add(&d->report, GRADE_FAIL, "configuration",
                environment ? "unset CYCLONEDDS_URI, or let it name a readable file: file:///…/x.xml"
@@ -33,12 +33,12 @@ bool doctor_configuration(doctor *d) {
                "%s: %s: %s", source, err.where, err.message);
     return false;
   }
-  if (o->config || environment)
+  if (o->common.config || environment)
     report_add(&d->report, GRADE_OK, "configuration", NULL, "%s: %.300s", source, text);
   else
     report_add(&d->report, GRADE_OK, "configuration", NULL,
                "built-in, interface %s (CYCLONEDDS_URI is not set)",
-               o->interface ? o->interface : "lo");
+               o->common.interface ? o->common.interface : "lo");
   return true;
 }
 

@@ -5,11 +5,9 @@
 #include "doctor.h"
 #include "interrupt.h"
 
-enum { KEY_CONFIG = 0x100, KEY_INTERFACE, KEY_TIMEOUT, KEY_JSON, KEY_SCAN };
+enum { KEY_TIMEOUT = 0x100, KEY_JSON, KEY_SCAN };
 
 static const struct argp_option option_table[] = {
-    {"interface", KEY_INTERFACE, "NAME", 0, "Network interface, as of the daemon (default lo)", 1},
-    {"config", KEY_CONFIG, "FILE", 0, "Cyclone DDS configuration; else CYCLONEDDS_URI", 1},
     {"timeout", KEY_TIMEOUT, "S", 0, "Listen this long where nothing comes (default 3)", 1},
     {"json", KEY_JSON, NULL, 0, "Print JSON instead of a table", 1},
     {"scan", KEY_SCAN, "A-B", 0, "Only tell who is in these domains", 1},
@@ -44,12 +42,6 @@ static error_t parse(int key, char *text, struct argp_state *state) {
   case ARGP_KEY_INIT:
     state->child_inputs[0] = &o->common;
     return 0;
-  case KEY_CONFIG:
-    o->config = text;
-    return 0;
-  case KEY_INTERFACE:
-    o->interface = text;
-    return 0;
   case KEY_TIMEOUT:
     o->timeout = pb_option_double(state, "--timeout", text, 0.1, 600);
     return 0;
@@ -61,10 +53,6 @@ static error_t parse(int key, char *text, struct argp_state *state) {
     return 0;
   case ARGP_KEY_ARG:
     argp_error(state, "unexpected argument '%s'", text);
-    return 0;
-  case ARGP_KEY_END:
-    if (o->config && o->interface)
-      argp_error(state, "--interface has no meaning with --config, which names the interface");
     return 0;
   default:
     return ARGP_ERR_UNKNOWN;

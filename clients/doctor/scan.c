@@ -18,7 +18,7 @@ typedef struct probe {
 
 static pb_status probe_open(const doctor_options *o, uint32_t domain, probe *p, pb_error *err) {
   const pb_domain_options options = {
-      .domain = domain, .config = o->config, .interface = o->interface};
+      .domain = domain, .config = o->common.config, .interface = o->common.interface};
   *p = (probe){.domain = domain};
   pb_status status = pb_domain_join(&options, &p->participant, err);
   for (int t = 0; !status && t < PB_TOPIC_COUNT; t++)

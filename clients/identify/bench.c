@@ -41,7 +41,8 @@ static pb_status maybe_reset(pb_bench *b, pb_reset_choice choice, pb_error *err)
 pb_status pb_bench_open(const pb_common_options *common, pb_reset_choice reset, pb_bench *out,
                         pb_error *err) {
   *out = (pb_bench){0};
-  pb_session_options options = {.domain = common->domain, .plant = common->plant, .history = 1000};
+  pb_session_options options = pb_common_session(common);
+  options.history = 1000;
   pb_status status = pb_session_open(&options, &out->session, err);
   if (status != PB_OK) return status;
   out->model = pb_session_model(out->session);

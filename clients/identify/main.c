@@ -46,7 +46,7 @@ static const char description[] =
     "explicit --settle the experiment waits for it instead.\n\n"
     "Exit codes: 0 done, 1 failed, 2 wrong command line.\n\n"
     "Examples:\n"
-    "  plantbus-identify --input Va --output Vs,y --band 1,500 --plot -o out\n"
+    "  plantbus-identify --input Va --output Vs,y --band 1,500 --plot --output-dir out\n"
     "  plantbus-identify --excitation noise --averages 20 --json\n";
 
 static error_t parse(int key, char *text, struct argp_state *state) {

@@ -12,7 +12,7 @@ static const char description[] =
     "modes that are looked at, by default 1 … 500 Hz (0.4 of the sample rate if that is less).\n\n"
     "Exit codes: 0 done, 1 failed, 2 wrong command line.\n\n"
     "Examples:\n"
-    "  plantbus-iff --plot -o out\n"
+    "  plantbus-iff --plot --output-dir out\n"
     "  plantbus-iff --gain 400 --strut 1 --band 5,200\n";
 
 static pb_status damp(const iff_options *o, pb_error *err) {

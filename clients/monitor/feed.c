@@ -89,7 +89,8 @@ static pb_status readers_make(feed *f, pb_error *err) {
 }
 
 static pb_status join(feed *f, const pb_common_options *o, pb_error *err) {
-  const pb_domain_options options = {.domain = o->domain};
+  const pb_domain_options options = {
+      .domain = o->domain, .config = o->config, .interface = o->interface};
   pb_status status = pb_domain_join(&options, &f->participant, err);
   for (int t = 0; !status && t < PB_TOPIC_COUNT; t++) {
     f->topic[t] = pb_topic_create(f->participant, (pb_topic)t);

@@ -88,8 +88,7 @@ static pb_status description_wait(recorder *r, pb_error *err) {
 }
 
 static pb_status begin(recorder *r, pb_error *err) {
-  const pb_session_options where = {.domain = r->options->common.domain,
-                                    .plant = r->options->common.plant};
+  const pb_session_options where = pb_common_session(&r->options->common);
   pb_status status = pb_session_open(&where, &r->session, err);
   if (status) return status;
   const char *plant = pb_session_description(r->session)->name;

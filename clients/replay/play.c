@@ -127,8 +127,8 @@ pb_status command_play(const replay_options *o, const pb_recording *r, pb_error 
   pb_status status = replay_load(r, o->choice.epoch, &run, err);
   if (status) return status;
   player p = {.run = &run};
-  const pb_session_options where = {.domain = o->common.domain,
-                                    .plant = o->common.plant ? o->common.plant : r->plant};
+  pb_session_options where = pb_common_session(&o->common);
+  if (!where.plant) where.plant = r->plant;
   status = pb_session_open(&where, &session, err);
   if (!status) status = plant_check(session, &run, err);
   if (!status) {

@@ -123,8 +123,8 @@ static pb_status ending_wait(const request_options *o, pb_session *session, cons
 }
 
 static pb_status run(const request_options *o, pb_error *err) {
-  const pb_session_options options = {
-      .domain = o->common.domain, .plant = o->common.plant, .timeout = o->timeout};
+  pb_session_options options = pb_common_session(&o->common);
+  options.timeout = o->timeout;
   pb_session *session = NULL;
   pb_answer answer = {0};
   char *body = NULL;

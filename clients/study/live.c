@@ -36,8 +36,7 @@ typedef struct live {
 // ---- changing the plant -------------------------------------------------------------------------
 
 static pb_session_options session_of(const live *l) {
-  return (pb_session_options){.domain = l->options->common.domain,
-                              .plant = l->options->common.plant};
+  return pb_common_session(&l->options->common);
 }
 
 static pb_status open_session(const live *l, pb_session **out, pb_error *err) {

@@ -1,5 +1,6 @@
 // Strict values of flags, exit codes of wrong command lines, the form of messages.
 #include "results.h"
+#include "session.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -104,6 +105,10 @@ static const struct argp_child tool_child[] = {
 static const struct argp tool_argp = {
     .options = tool_option, .parser = parse_tool, .children = tool_child};
 
+static bool same_text(const char *a, const char *b) {
+  return !strcmp(a ? a : "", b ? b : "");
+}
+
 // Parses in a child; returns its exit code (10 when parsing came to an end) and what it wrote.
 static int run_tool(char **argv, tool *expected, char *text, size_t size) {
   int pipes[2];
@@ -115,9 +120,11 @@ static int run_tool(char **argv, tool *expected, char *text, size_t size) {
     dup2(pipes[1], STDERR_FILENO);
     tool t = {.gain = 1};
     error_t failure = pb_options_parse(&tool_argp, argc, argv, &t);
-    bool same = t.gain == expected->gain && t.common.domain == expected->common.domain &&
-                !strcmp(t.common.plant ? t.common.plant : "",
-                        expected->common.plant ? expected->common.plant : "");
+    const pb_session_options where = pb_common_session(&t.common);
+    bool same = t.gain == expected->gain && where.domain == expected->common.domain &&
+                same_text(where.plant, expected->common.plant) &&
+                same_text(where.interface, expected->common.interface) &&
+                same_text(where.config, expected->common.config);
     _exit(failure || !same ? 11 : 10);
   }
   close(pipes[1]);
@@ -138,6 +145,15 @@ static void test_command_line(void **state) {
   char *good[] = {"tool", "--gain", "2.5", "--domain", "7", "--plant=bench", NULL};
   assert_int_equal(run_tool(good, &expected, text, sizeof text), 10);
   assert_string_equal(text, "");
+  expected = (tool){.gain = 1, .common = {.interface = "eth1", .plant = "b"}};
+  char *network[] = {"tool", "--interface", "eth1", "-p", "b", NULL};
+  assert_int_equal(run_tool(network, &expected, text, sizeof text), 10);
+  expected = (tool){.gain = 1, .common = {.config = "dds.xml"}};
+  char *file[] = {"tool", "--config=dds.xml", NULL};
+  assert_int_equal(run_tool(file, &expected, text, sizeof text), 10);
+  char *both[] = {"tool", "--config=dds.xml", "--interface=lo", NULL};
+  assert_int_equal(run_tool(both, &expected, text, sizeof text), PB_EXIT_USAGE);
+  assert_non_null(strstr(text, "--interface has no meaning with --config"));
   char *word[] = {"tool", "--gain", "much", NULL};
   assert_int_equal(run_tool(word, &expected, text, sizeof text), PB_EXIT_USAGE);
   assert_non_null(strstr(text, "--gain: 'much' is not a number"));
