@@ -5,7 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "results.h"
+#include "options.h"
+#include "standard_output.h"
 
 static void print_help(FILE *stream, const char *tool, const char *about, const pb_command *c) {
   fprintf(stream, "Usage: %s COMMAND [OPTION...]\n%s\n\nCommands:\n", tool, about);
@@ -22,6 +23,7 @@ int pb_commands_run(int argc, char **argv, const char *about, const pb_command *
   const char *tool = argv[0], *slash = strrchr(tool, '/');
   if (slash) tool = slash + 1;
   const char *word = argc > 1 ? argv[1] : "";
+  pb_stdout_guard();
   if (!strcmp(word, "--help") || !strcmp(word, "-?")) {
     print_help(stdout, tool, about, commands);
     return PB_EXIT_DONE;
@@ -40,8 +42,7 @@ int pb_commands_run(int argc, char **argv, const char *about, const pb_command *
     argv[1] = name;
     int code = c->run(argc - 1, argv + 1);
     free(name);
-    // Also where the command does not look itself.
-    return code == PB_EXIT_DONE ? pb_result_end(PB_OK, NULL) : code;
+    return code;
   }
   if (word[0]) fprintf(stderr, "%s: '%s' is not one of its commands\n", tool, word);
   print_help(stderr, tool, about, commands);

@@ -7,6 +7,7 @@
 
 #include "base/json.h"
 #include "base/text.h"
+#include "standard_output.h"
 
 static pb_status parse_named(const char *text, size_t length, const char *name, cJSON **out,
                              pb_error *err) {
@@ -44,6 +45,7 @@ pb_status pb_json_argument(const char *argument, cJSON **out, pb_error *err) {
 static pb_status put(const char *text, const char *end, FILE *stream, pb_error *err) {
   fputs(text, stream);
   fputs(end, stream);
+  if (stream == stdout) return pb_stdout_flush(err);
   if (fflush(stream) != 0 || ferror(stream))
     return pb_fail(err, PB_ERR_IO, "output", "cannot be written");
   return PB_OK;

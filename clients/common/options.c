@@ -7,11 +7,13 @@
 #include <string.h>
 
 #include "session.h"
+#include "standard_output.h"
 
 const char *argp_program_version = "plantbus " PB_VERSION;
 
 error_t pb_options_parse(const struct argp *argp, int argc, char **argv, void *input) {
   argp_err_exit_status = PB_EXIT_USAGE;
+  pb_stdout_guard();
   return argp_parse(argp, argc, argv, 0, NULL, input);
 }
 

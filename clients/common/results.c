@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "outfile.h"
+#include "standard_output.h"
 
 enum { KEY_JSON = 0x600, KEY_PLOT, KEY_DIR };
 
@@ -86,16 +87,9 @@ pb_status pb_result_check(const pb_result_options *o, pb_error *err) {
 
 // ---- the end ------------------------------------------------------------------------------------
 
-pb_status pb_result_flush(pb_error *err) {
-  errno = 0;
-  if (fflush(stdout) == 0 && !ferror(stdout)) return PB_OK;
-  return pb_fail(err, PB_ERR_IO, "standard output",
-                 errno ? "cannot be written: %s" : "cannot be written", strerror(errno));
-}
-
 int pb_result_end(pb_status status, const pb_error *err) {
   pb_error own;
-  if (!status && (status = pb_result_flush(&own))) err = &own;
+  if (!status && (status = pb_stdout_flush(&own))) err = &own;
   if (!status) return PB_EXIT_DONE;
   pb_print_error(stderr, err);
   return PB_EXIT_FAILED;

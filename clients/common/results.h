@@ -27,9 +27,6 @@ pb_status pb_result_path(const pb_result_options *options, const char *name, cha
 // leaves nothing behind. Nothing to do where no file is asked for. PB_ERR_IO.
 pb_status pb_result_check(const pb_result_options *options, pb_error *err);
 
-// PB_ERR_IO where what was told on the standard output did not get there.
-pb_status pb_result_flush(pb_error *err);
-
 // The end of a tool: flushes the standard output, prints the error if there is one, and returns the
 // exit code.
 int pb_result_end(pb_status status, const pb_error *err);

@@ -172,8 +172,6 @@ int main(int argc, char **argv) {
   pb_status status = pb_session_open(&session_options, &session, &err);
   if (!status) status = run_command(&options, session, &err);
   pb_session_close(session);
-  if (!status && fflush(stdout) != 0)
-    status = pb_fail(&err, PB_ERR_IO, "output", "cannot be written");
   if (status) pb_print_error(stderr, &err);
   return status ? PB_EXIT_FAILED : PB_EXIT_DONE;
 }

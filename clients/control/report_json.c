@@ -2,6 +2,7 @@
 #include <math.h>
 
 #include "control_tool.h"
+#include "standard_output.h"
 
 static void json_matrix(pb_jsonout *o, const char *key, const double *m, size_t rows, size_t cols) {
   pb_jsonout_array(o, key);
@@ -148,5 +149,5 @@ pb_status control_print_json(const control_design *d, const control_judgement *j
   json_transmission(&o, d, j);
   pb_jsonout_object_end(&o);
   pb_jsonout_end(&o);
-  return pb_result_flush(err);
+  return pb_stdout_flush(err);
 }

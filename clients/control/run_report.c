@@ -3,6 +3,7 @@
 
 #include "run.h"
 #include "table.h"
+#include "standard_output.h"
 
 static pb_status print_stages(const run_result *r, pb_error *err) {
   pb_table t = {0};
@@ -141,5 +142,5 @@ pb_status run_print_json(const run_result *r, pb_error *err) {
   }
   pb_jsonout_object_end(&o);
   pb_jsonout_end(&o);
-  return pb_result_flush(err);
+  return pb_stdout_flush(err);
 }

@@ -7,6 +7,7 @@
 
 #include "options.h"
 #include "session.h"
+#include "standard_output.h"
 
 typedef struct controller {
   int output;  // index of y in a sample
@@ -33,6 +34,7 @@ static int fail(const pb_error *err) {
 }
 
 int main(int argc, char **argv) {
+  pb_stdout_guard();
   double gain, seconds;
   uint64_t domain = 0;
   bool good = (argc == 5 || argc == 6) && pb_parse_double(argv[3], &gain) &&

@@ -7,6 +7,7 @@
 #include "results.h"
 #include "study/gate.h"
 #include "table.h"
+#include "standard_output.h"
 
 enum { KEY_JSON = 0x100 };
 
@@ -160,7 +161,7 @@ int main(int argc, char **argv) {
       print_json(&o, &gate);
     else if (!status)
       status = print_table(&o, &gate, &err);
-    if (!status) status = pb_result_flush(&err);
+    if (!status) status = pb_stdout_flush(&err);
     code = !status && gate.passed ? PB_EXIT_DONE : PB_EXIT_FAILED;
   }
   if (status) pb_print_error(stderr, &err);

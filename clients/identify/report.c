@@ -5,6 +5,7 @@
 #include "identify.h"
 #include "jsonout.h"
 #include "table.h"
+#include "standard_output.h"
 
 // Difference in percent; below 1e-6 it is rounding and shown as 0.
 static double percent(double measured, double exact) {
@@ -299,5 +300,5 @@ pb_status identify_print_json(const identify_result *r, pb_error *err) {
   json_frf(&j, a);
   pb_jsonout_object_end(&j);
   pb_jsonout_end(&j);
-  return pb_result_flush(err);
+  return pb_stdout_flush(err);
 }

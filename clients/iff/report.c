@@ -4,6 +4,7 @@
 #include "iff_tool.h"
 #include "jsonout.h"
 #include "table.h"
+#include "standard_output.h"
 
 static double percent(double measured, double predicted) {
   double difference = 100 * (measured / predicted - 1);
@@ -169,5 +170,5 @@ pb_status iff_print_json(const iff_result *r, pb_error *err) {
   json_measurement(&j, "damped", &r->closed);
   pb_jsonout_object_end(&j);
   pb_jsonout_end(&j);
-  return pb_result_flush(err);
+  return pb_stdout_flush(err);
 }

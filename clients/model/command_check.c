@@ -193,7 +193,6 @@ int command_check(const tool *t) {
   pb_error err = {0};
   run_check(t, &c);
   int code = wants_table(t) ? tool_end(print_check(&c, &err), &err) : emit_json(t, check_json, &c);
-  if (!emit_flush()) code = PB_EXIT_FAILED;
   if (c.error.code) code = tool_end(c.error.code, &c.error);
   pb_model_free(c.model);
   pb_plant_free(c.plant);

@@ -20,14 +20,6 @@ bool wants_table(const tool *t) {
   return !t->json && !t->out;
 }
 
-bool emit_flush(void) {
-  if (fflush(stdout) == 0 && !ferror(stdout)) return true;
-  pb_error err;
-  pb_fail(&err, PB_ERR_IO, "standard output", "cannot be written: %s", strerror(errno));
-  pb_print_error(stderr, &err);
-  return false;
-}
-
 int emit_done(const tool *t, pb_status status, const pb_error *err) {
   if (!status) fprintf(stderr, "%s: wrote %s\n", program_invocation_short_name, t->out);
   return tool_end(status, err);
@@ -53,7 +45,6 @@ int emit_json(const tool *t, json_function *write, const void *context) {
     pb_jsonout_begin(&json, stdout);
     write(&json, context);
     pb_jsonout_end(&json);
-    if (!emit_flush()) return PB_EXIT_FAILED;
   }
   if (t->out_format != FORMAT_JSON) return PB_EXIT_DONE;
   pb_error err = {0};
@@ -123,8 +114,7 @@ static pb_status columns_mat(const tool *t, const columns *data, pb_error *err) 
 int emit_columns(const tool *t, const columns *data) {
   pb_error err = {0};
   if (wants_table(t)) {
-    int code = tool_end(columns_table(data, &err), &err);
-    return code ? code : emit_flush() ? PB_EXIT_DONE : PB_EXIT_FAILED;
+    return tool_end(columns_table(data, &err), &err);
   }
   int code = emit_json(t, columns_json, data);
   if (code) return code;

@@ -260,7 +260,6 @@ static int run(const line *l) {
   pb_warnings_clear(&warnings);
   int code = tool_end(status, &err);
   if (!code) code = l->command->run(t, model);
-  if (!emit_flush() && !code) code = PB_EXIT_FAILED;
   pb_model_free(model);
   return code;
 }

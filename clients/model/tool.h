@@ -118,9 +118,6 @@ bool wants_table(const tool *t);
 // Says on standard error that the file of -o was written. Returns status's exit code.
 int emit_done(const tool *t, pb_status status, const pb_error *err);
 
-// Flushes standard output; false (with a message) when it cannot be written.
-bool emit_flush(void);
-
 // "inputs" and "outputs" as JSON arrays of names.
 void emit_channels_json(pb_jsonout *json, const channels *ch);
 

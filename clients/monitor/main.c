@@ -8,6 +8,7 @@
 #include "base/json.h"
 #include "feed.h"
 #include "interrupt.h"
+#include "standard_output.h"
 #include "terminal.h"
 
 enum { KEY_ONCE = 0x100, KEY_JSON, KEY_RATE, KEY_TIMEOUT };
@@ -91,9 +92,7 @@ static pb_status print(const monitor_options *o, const monitor_state *state, pb_
     if (!status) fputs(s.text.text, stdout);
   }
   free(s.text.text);
-  if (!status && (fflush(stdout) != 0 || ferror(stdout)))
-    status = pb_fail(err, PB_ERR_IO, "output", "cannot be written");
-  return status;
+  return status ? status : pb_stdout_flush(err);
 }
 
 // A plant that stands still publishes no sample: a status alone must do after a moment.
@@ -136,9 +135,8 @@ static pb_status draw(const monitor_state *state, pb_error *err) {
   if (s.row < s.height) pb_text_append(&s.text, "\033[J");
   const pb_status status = s.text.failed ? pb_fail_memory(err, "view") : PB_OK;
   if (!status) fputs(s.text.text, stdout);
-  fflush(stdout);
   free(s.text.text);
-  return status;
+  return status ? status : pb_stdout_flush(err);
 }
 
 static pb_status run_live(const monitor_options *o, feed *f, pb_error *err) {

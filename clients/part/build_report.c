@@ -6,6 +6,7 @@
 #include "build.h"
 #include "jsonout.h"
 #include "table.h"
+#include "standard_output.h"
 
 static double published(const pb_part *part, const char *name) {
   for (size_t i = 0; i < part->published; i++)
@@ -100,7 +101,7 @@ static pb_status report_json(const build *b, const build_options *options, pb_er
   pb_jsonout_object_end(&json);
   pb_jsonout_object_end(&json);
   pb_jsonout_end(&json);
-  return ferror(stdout) ? pb_fail(err, PB_ERR_IO, "standard output", "cannot be written") : PB_OK;
+  return pb_stdout_flush(err);
 }
 
 pb_status build_report(const build *b, const build_options *options, pb_error *err) {

@@ -8,6 +8,7 @@
 #include "jsonout.h"
 #include "plot.h"
 #include "table.h"
+#include "standard_output.h"
 
 // One row a build. Columns are those of the first one: the type of part stays the same.
 typedef struct row {
@@ -78,7 +79,7 @@ static pb_status print_json(const study *s, pb_error *err) {
   pb_jsonout_array_end(&json);
   pb_jsonout_object_end(&json);
   pb_jsonout_end(&json);
-  return ferror(stdout) ? pb_fail(err, PB_ERR_IO, "standard output", "cannot be written") : PB_OK;
+  return pb_stdout_flush(err);
 }
 
 // ---- plot ---------------------------------------------------------------------------------------

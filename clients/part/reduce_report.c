@@ -7,6 +7,7 @@
 #include "jsonout.h"
 #include "reduce.h"
 #include "table.h"
+#include "standard_output.h"
 
 enum { SHOWN = 12 };  // frequencies of each kind in the tables
 
@@ -215,7 +216,7 @@ static pb_status report_json(const reduce_run *run, const reduce_options *o, pb_
   pb_jsonout_array_end(&json);
   pb_jsonout_object_end(&json);
   pb_jsonout_end(&json);
-  return ferror(stdout) ? pb_fail(err, PB_ERR_IO, "standard output", "cannot be written") : PB_OK;
+  return pb_stdout_flush(err);
 }
 
 pb_status reduce_report(const reduce_run *run, const reduce_options *o, pb_error *err) {

@@ -14,6 +14,7 @@
 #include "session_change.h"
 #include "study.h"
 #include "table.h"
+#include "standard_output.h"
 
 // What was measured with one value.
 typedef struct live_row {
@@ -222,7 +223,7 @@ static pb_status print_json(const live *l, pb_error *err) {
   pb_jsonout_array_end(&j);
   pb_jsonout_object_end(&j);
   pb_jsonout_end(&j);
-  return pb_result_flush(err);
+  return pb_stdout_flush(err);
 }
 
 // ---- all of it ----------------------------------------------------------------------------------

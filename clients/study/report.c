@@ -6,6 +6,7 @@
 #include "jsonout.h"
 #include "study.h"
 #include "table.h"
+#include "standard_output.h"
 
 // ---- tables -------------------------------------------------------------------------------------
 
@@ -189,5 +190,5 @@ pb_status study_print_json(const study *s, pb_error *err) {
   pb_jsonout_array_end(&j);
   pb_jsonout_object_end(&j);
   pb_jsonout_end(&j);
-  return pb_result_flush(err);
+  return pb_stdout_flush(err);
 }

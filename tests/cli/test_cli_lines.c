@@ -135,21 +135,45 @@ static void places_that_take_nothing(void **state) {
   };
   char line[500];
   for (size_t k = 0; k < sizeof lines / sizeof *lines; k++) {
-    snprintf(line, sizeof line, BIN "%s -o /no/directory", lines[k]);
+    snprintf(line, sizeof line, BIN "%s --output-dir /no/directory", lines[k]);
     cli_expect(line, 1, "/no/directory");
   }
+}
+
+// Runs the line with a full standard output: exit code 1, told once.
+static void expect_full(const char *line) {
+  char shell[600], text[4000];
+  snprintf(shell, sizeof shell, "%s 2>&1 > /dev/full", line);
+  FILE *run = popen(shell, "r");
+  assert_non_null(run);
+  text[fread(text, 1, sizeof text - 1, run)] = 0;
+  const int status = pclose(run);
+  const char *told = strstr(text, "standard output: cannot be written");
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != 1 || !told || strstr(told + 1, "standard output"))
+    fail_msg("%s ended with %d: %s", line, status, text);
+}
+
+static void a_full_standard_output(void **state) {
+  (void)state;
   static const char *const full[] = {
       "actuator constants",
       "actuator constants --json",
       "actuator select --json",
       "gate " GATE " " HEXAPOD,
+      "model info " HEXAPOD,
+      "model frf --json --output Vs --input Va --points 100000 " BENCH,
+      "part --help",
       "part doctor " PB_CONFIG "/elements/flexible-joint.mat",
+      "example --help",
   };
+  char line[500];
   for (size_t k = 0; k < sizeof full / sizeof *full; k++) {
-    snprintf(line, sizeof line, BIN "%s > /dev/full 2> /dev/null", full[k]);
-    const int status = system(line);
-    assert_true(WIFEXITED(status));
-    if (WEXITSTATUS(status) != 1) fail_msg("%s ended with %d", line, WEXITSTATUS(status));
+    snprintf(line, sizeof line, BIN "%s", full[k]);
+    expect_full(line);
+  }
+  for (size_t k = 0; k < sizeof tools / sizeof *tools; k++) {
+    snprintf(line, sizeof line, BIN "%s --help", tools[k]);
+    expect_full(line);
   }
 }
 
@@ -157,7 +181,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(unknown_flags_and_help),   cmocka_unit_test(missing_files),
       cmocka_unit_test(values_of_flags),          cmocka_unit_test(what_does_not_go_together),
-      cmocka_unit_test(places_that_take_nothing),
+      cmocka_unit_test(places_that_take_nothing), cmocka_unit_test(a_full_standard_output),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
