@@ -102,9 +102,10 @@ static pb_status names_read(const cJSON *body, const pb_model *model, bool input
     snprintf(where, sizeof where, "/%s/%zu", key, *count);
     if (!cJSON_IsString(item)) return pb_fail(err, PB_ERR_SCHEMA, where, "expected a name");
     const char *text = item->valuestring;
-    const int i = input ? pb_model_input(model, text) : pb_model_output(model, text);
-    if (i < 0)
-      return pb_fail(err, PB_ERR_REFERENCE, where, "the plant has no %s '%.64s'", noun, text);
+    size_t i;
+    pb_status status = pb_signal_find(input ? model->input : model->output,
+                                      input ? model->nu : model->ny, noun, text, where, &i, err);
+    if (status) return status;
     for (size_t k = 0; k < *count; k++)
       if (index[k] == (uint32_t)i)
         return pb_fail(err, PB_ERR_SCHEMA, where, "'%.64s' is named twice", text);

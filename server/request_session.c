@@ -31,10 +31,11 @@ static pb_status inputs_read(pb_daemon *d, const cJSON *body, uint32_t *index, u
     char where[64];
     snprintf(where, sizeof where, "/inputs/%u", *count);
     if (!cJSON_IsString(item)) return pb_fail(err, PB_ERR_SCHEMA, where, "expected a name");
-    const int i = pb_model_input(pb_daemon_live(d)->model, item->valuestring);
-    if (i < 0)
-      return pb_fail(err, PB_ERR_REFERENCE, where, "the plant has no input '%.64s'",
-                     item->valuestring);
+    const pb_model *model = pb_daemon_live(d)->model;
+    size_t i;
+    pb_status status =
+        pb_signal_find(model->input, model->nu, "input", item->valuestring, where, &i, err);
+    if (status) return status;
     for (uint32_t k = 0; k < *count; k++)
       if (index[k] == (uint32_t)i)
         return pb_fail(err, PB_ERR_SCHEMA, where, "'%.64s' is named twice", item->valuestring);

@@ -76,12 +76,8 @@ static pb_status choose_experiment(const live_options *o, const pb_bench *bench,
 
 static pb_status find(const pb_model *m, bool input, const char *name, const char *flag,
                       size_t *index, pb_error *err) {
-  const int at = input ? pb_model_input(m, name) : pb_model_output(m, name);
-  if (at < 0)
-    return pb_fail(err, PB_ERR_REFERENCE, flag, "the plant has no %s %s",
-                   input ? "input" : "output", name);
-  *index = (size_t)at;
-  return PB_OK;
+  return pb_signal_find(input ? m->input : m->output, input ? m->nu : m->ny,
+                        input ? "input" : "output", name, flag, index, err);
 }
 
 static pb_status measure(const live_options *o, pb_bench *bench,

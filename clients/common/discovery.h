@@ -65,4 +65,9 @@ pb_status pb_plants_find(dds_entity_t participant, dds_entity_t description_topi
                          pb_plants_seen *out, pb_error *err);
 void pb_plants_clear(pb_plants_seen *plants);
 
+// The failure of a search that found nothing on this domain in this time: PB_ERR_STATE, with the
+// plants that are served there when another one was named. [init]
+pb_status pb_plants_none(dds_entity_t participant, dds_entity_t description_topic,
+                         const char *plant, uint32_t domain, double waited, pb_error *err);
+
 #endif

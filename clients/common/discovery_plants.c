@@ -1,4 +1,5 @@
 // The plants that daemons describe: see discovery.h.
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -102,4 +103,28 @@ void pb_plants_clear(pb_plants_seen *plants) {
     plantbus_PlantDescription_free(plants->plant[i].description, DDS_FREE_ALL);
   free(plants->plant);
   *plants = (pb_plants_seen){0};
+}
+
+pb_status pb_plants_none(dds_entity_t participant, dds_entity_t description_topic,
+                         const char *plant, uint32_t domain, double waited, pb_error *err) {
+  static const double listen =
+      0.5;  // daemons that are there have had the search's time to be heard
+  pb_plants_seen others = {0};
+  pb_error ignored;
+  char names[300] = "";
+  size_t used = 0;
+  if (plant) pb_plants_find(participant, description_topic, NULL, listen, NULL, &others, &ignored);
+  for (size_t i = 0; i < others.count; i++) {
+    const char *name = others.plant[i].description->name;
+    if (used + strlen(name) + 26 > sizeof names) {
+      snprintf(names + used, sizeof names - used, ", and more");
+      break;
+    }
+    used += (size_t)snprintf(names + used, sizeof names - used, "%s%s",
+                             i ? ", " : "; served there: ", name);
+  }
+  pb_plants_clear(&others);
+  return pb_fail(err, PB_ERR_STATE, plant ? plant : "plant",
+                 "no daemon serves it on domain %u (waited %g s)%s", domain, waited,
+                 names[0] ? names : "; plantbus-doctor tells why");
 }

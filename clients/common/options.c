@@ -73,11 +73,29 @@ static bool append_name(pb_name_list *list, const char *name) {
   return true;
 }
 
+// The next name of a list from *at on, into name, which has room for all of it; *at is then past
+// its comma, or NULL behind the last one.
+static bool next_name(const char **at, char *name) {
+  const char *p = *at;
+  const bool quoted = *p == '"';
+  if (quoted) p++;
+  for (; *p && (quoted ? *p != '"' || p[1] == '"' : *p != ','); p++) {
+    p += quoted && *p == '"';
+    *name++ = *p;
+  }
+  *name = 0;
+  if (quoted && *p++ != '"') return false;
+  if (*p && *p != ',') return false;
+  *at = *p ? p + 1 : NULL;
+  return true;
+}
+
 bool pb_parse_names(const char *text, pb_name_list *list) {
-  char *copy = strdup(text), *rest = copy, *item;
-  bool good = copy != NULL;
-  while (good && (item = strsep(&rest, ","))) good = item[0] && append_name(list, item);
-  free(copy);
+  char *name = malloc(strlen(text) + 1);
+  bool good = name != NULL;
+  for (const char *at = text; good && at;)
+    good = next_name(&at, name) && name[0] && append_name(list, name);
+  free(name);
   return good;
 }
 
@@ -122,7 +140,11 @@ void pb_option_double_list(const struct argp_state *state, const char *flag, con
 void pb_option_names(const struct argp_state *state, const char *flag, const char *text,
                      pb_name_list *list) {
   if (!pb_parse_names(text, list)) {
-    argp_error(state, "%s: '%s' is not a list of names separated by commas", flag, text);
+    argp_error(
+        state,
+        "%s: '%s' is not a list of names separated by commas (a name with a comma: in double "
+        "quotes)",
+        flag, text);
   }
 }
 

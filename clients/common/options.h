@@ -39,7 +39,9 @@ typedef struct pb_name_list {
   char **name;  // [count], each owned
 } pb_name_list;
 
-// Appends the comma-separated names of text; false: an empty name, or out of memory.
+// Appends the comma-separated names of text. A name with a comma in it stands in double quotes,
+// where a doubled one means itself: '"a,b",c' is two names. False: an empty name, a quote that is
+// not closed or is followed by something else than a comma, or out of memory.
 bool pb_parse_names(const char *text, pb_name_list *list);
 void pb_name_list_free(pb_name_list *list);
 

@@ -2,6 +2,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "discovery.h"
 #include "session_internal.h"
 
 static const int64_t settle_ns = 100000000;  // to hear of other plants, when none is named
@@ -72,8 +73,8 @@ static pb_status description_wait(pb_session *s, dds_entity_t reader, const char
   dds_delete(waitset);
   dds_delete(condition);
   if (!s->received)
-    return pb_fail(err, PB_ERR_STATE, plant ? plant : "plant",
-                   "no daemon serves it on domain %u (waited %g s)", s->domain, s->timeout);
+    return pb_plants_none(s->participant, s->topic[PB_TOPIC_DESCRIPTION], plant, s->domain,
+                          s->timeout, err);
   if (other[0])
     return pb_fail(err, PB_ERR_STATE, "plant", "'%s' and '%s' are served on domain %u: name one",
                    s->received->name, other, s->domain);

@@ -118,26 +118,18 @@ void pb_bench_tell_trouble(const pb_experiment *experiment) {
   tell("steps at which another client moved an input that is not driven here", t->disturbed);
 }
 
-static pb_status find_name(const pb_signal *signal, size_t count, const char *name,
-                           const char *kind, size_t *index, pb_error *err) {
-  for (size_t i = 0; i < count; i++) {
-    if (strcmp(signal[i].name, name) != 0) continue;
-    *index = i;
-    return PB_OK;
-  }
-  return pb_fail(err, PB_ERR_REFERENCE, name, "the plant has no such %s", kind);
-}
-
 pb_status pb_bench_choose(const pb_name_list *names, const pb_signal *signal, size_t count,
                           const char *kind, size_t **index, size_t *chosen, pb_error *err) {
   *chosen = names->count > 0 ? names->count : count;
   *index = malloc((*chosen + 1) * sizeof **index);
   if (!*index) return pb_fail_memory(err, kind);
   pb_status status = PB_OK;
+  char flag[32];
+  snprintf(flag, sizeof flag, "--%s", kind);
   for (size_t k = 0; k < *chosen && status == PB_OK; k++) {
     (*index)[k] = k;
     if (names->count == 0) continue;
-    status = find_name(signal, count, names->name[k], kind, &(*index)[k], err);
+    status = pb_signal_find(signal, count, kind, names->name[k], flag, &(*index)[k], err);
     for (size_t j = 0; j < k && status == PB_OK; j++) {
       if ((*index)[j] != (*index)[k]) continue;
       status = pb_fail(err, PB_ERR_ARGUMENT, names->name[k], "this %s is named twice", kind);

@@ -5,32 +5,21 @@
 
 #include "tool.h"
 
-static void list_names(const pb_signal *signal, size_t count, char *text, size_t size) {
-  size_t used = 0;
-  text[0] = 0;
-  for (size_t i = 0; i < count && used < size; i++) {
-    used += (size_t)snprintf(text + used, size - used, "%s%s", i ? ", " : "", signal[i].name);
-  }
-}
-
 // Indices of the named signals, of all, or of the first one. A name the plant does not have is a
 // mistake on the command line.
-static int choose(const char *flag, const pb_name_list *wanted, const pb_signal *signal,
+static int choose(const char *kind, const pb_name_list *wanted, const pb_signal *signal,
                   size_t count, bool single, size_t *index, size_t *chosen) {
   *chosen = wanted->count ? wanted->count : single && count ? 1 : count;
   for (size_t k = 0; k < *chosen; k++) {
     index[k] = k;
     if (!wanted->count) continue;
-    size_t i = 0;
-    while (i < count && strcmp(signal[i].name, wanted->name[k])) i++;
-    if (i == count) {
-      char names[512];
-      list_names(signal, count, names, sizeof names);
-      fprintf(stderr, "%s: --%s: the plant has no %s '%s'; it has %s\n",
-              program_invocation_short_name, flag, flag, wanted->name[k], names);
+    char where[16];
+    pb_error err;
+    snprintf(where, sizeof where, "--%s", kind);
+    if (pb_signal_find(signal, count, kind, wanted->name[k], where, &index[k], &err)) {
+      pb_print_error(stderr, &err);
       return PB_EXIT_USAGE;
     }
-    index[k] = i;
   }
   return PB_EXIT_DONE;
 }

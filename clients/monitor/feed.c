@@ -43,9 +43,8 @@ static pb_status choose(feed *f, const pb_common_options *o, double timeout, pb_
                                     timeout, pb_interrupted, &plants, err);
   if (status) return status;
   if (plants.count == 0) {
-    status = pb_fail(err, PB_ERR_STATE, o->plant ? o->plant : "plant",
-                     "no daemon serves it on domain %u (waited %g s); plantbus-doctor tells why",
-                     o->domain, timeout);
+    status = pb_plants_none(f->participant, f->topic[PB_TOPIC_DESCRIPTION], o->plant, o->domain,
+                            timeout, err);
   } else if (plants.count > 1) {
     list_plants(f, &plants);
     status = pb_fail(err, PB_ERR_STATE, "plant", "%zu are served on domain %u: name one by --plant",

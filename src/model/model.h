@@ -93,6 +93,11 @@ void pb_model_free(pb_model *model);
 int pb_model_input(const pb_model *model, const char *name);
 int pb_model_output(const pb_model *model, const char *name);
 
+// The index of a signal that must be there: of a list [count] of one kind, "input" or "output".
+// Fails with PB_ERR_REFERENCE at `where`, listing the names there are. [any]
+pb_status pb_signal_find(const pb_signal *signal, size_t count, const char *kind, const char *name,
+                         const char *where, size_t *index, pb_error *err);
+
 // Size in bytes of a state of this model. [any]
 size_t pb_state_bytes(const pb_model *model);
 

@@ -15,18 +15,6 @@
 static const double magic = 1886351986;  // "pb" and a layout version
 enum { HEADER = 11, SIZES = 8, LARGEST = 100000, ELECTRONICS = 8 };
 
-int pb_model_input(const pb_model *m, const char *name) {
-  for (size_t i = 0; i < m->nu; i++)
-    if (!strcmp(m->input[i].name, name)) return (int)i;
-  return -1;
-}
-
-int pb_model_output(const pb_model *m, const char *name) {
-  for (size_t i = 0; i < m->ny; i++)
-    if (!strcmp(m->output[i].name, name)) return (int)i;
-  return -1;
-}
-
 static void put(double **at, const double *values, size_t count) {
   memcpy(*at, values, count * sizeof **at);
   *at += count;

@@ -60,12 +60,8 @@ static const char *const motion_name[N] = {"Dx", "Dy", "Dz", "Rx", "Ry", "Rz"};
 
 static pb_status find_signal(const pb_model *m, const char *name, bool input, size_t *out,
                              pb_error *err) {
-  int index = input ? pb_model_input(m, name) : pb_model_output(m, name);
-  if (index < 0)
-    return pb_fail(err, PB_ERR_STATE, name, "the plant has no such %s of a hexapod",
-                   input ? "input" : "output");
-  *out = (size_t)index;
-  return PB_OK;
+  return pb_signal_find(input ? m->input : m->output, input ? m->nu : m->ny,
+                        input ? "input" : "output", name, name, out, err);
 }
 
 static pb_status stiffness(judgement *j, const pb_gate_limit *l, double *value, pb_error *err) {

@@ -483,7 +483,7 @@ static void test_usage_errors(void **state) {
       {"frf " BENCH " --frequencies 1 --from 2", "--frequencies excludes"},
       {"frf " BENCH " --from 20 --to 10", "--from is not below --to"},
       {"frf " BENCH " --points 0", "--points"},
-      {"frf " BENCH " --input Vb", "the plant has no input 'Vb'; it has Va, F"},
+      {"frf " BENCH " --input Vb", "--input: the plant has no input 'Vb'; its inputs: Va, F"},
       {"step " BENCH " --input Va,F", "step takes one --input"},
       {"step " BENCH " --at 3,2", "ascending"},
       {"step " BENCH " --at 1.5", "ascending whole numbers"},

@@ -109,6 +109,7 @@ static void clients_of_nothing_are_told(void **state) {
   const pb_session_options other = {.domain = daemon.domain, .plant = "another", .timeout = 0.3};
   assert_int_equal(pb_session_open(&other, &session, &err), PB_ERR_STATE);
   assert_string_equal(err.where, "another");
+  assert_non_null(strstr(err.message, "served there: "));
   e2e_daemon_end(&daemon);
 }
 

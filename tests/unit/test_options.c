@@ -59,6 +59,16 @@ static void test_lists(void **state) {
   assert_string_equal(names.name[2], "Fz");
   assert_false(pb_parse_names("a,,b", &names));
   pb_name_list_free(&names);
+  assert_true(pb_parse_names("\"x, y\",z,\"5\"\" disk\",a\"b", &names));
+  assert_int_equal(names.count, 4);
+  assert_string_equal(names.name[0], "x, y");
+  assert_string_equal(names.name[1], "z");
+  assert_string_equal(names.name[2], "5\" disk");
+  assert_string_equal(names.name[3], "a\"b");
+  static const char *const bad[] = {"", ",", "a,", "\"", "\"a", "\"a\"b", "\"\"", "a,\"b"};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+    assert_false(pb_parse_names(bad[i], &names));
+  pb_name_list_free(&names);
   assert_int_equal(names.count, 0);
 }
 
