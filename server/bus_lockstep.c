@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "bus_flags.h"
 #include "daemon.h"
 #include "fpenv.h"
 
@@ -23,8 +24,6 @@ void pb_bus_publish_sample(pb_daemon *d) {
 }
 
 void pb_bus_note_faults(pb_daemon *d, const pb_record *record) {
-  static const char *const name[PB_FLAG_COUNT] = {"held", "late", "non-finite", "overrun",
-                                                  "saturated"};
   const uint32_t fresh = record->flags & ~d->faults;
   if (!fresh) return;
   d->faults |= fresh;
@@ -32,7 +31,7 @@ void pb_bus_note_faults(pb_daemon *d, const pb_record *record) {
     if (!(fresh & (1u << bit))) continue;
     d->fault_step[bit] = record->step;
     pb_engine_note(&d->engine, PB_EVENT_FAULT, "fault '%s' for the first time at step %llu",
-                   name[bit], (unsigned long long)record->step);
+                   pb_flag_name((unsigned)bit), (unsigned long long)record->step);
   }
 }
 

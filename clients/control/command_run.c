@@ -64,8 +64,8 @@ static void tell_trouble(const run_result *r) {
     const pb_experiment_trouble *t = &r->stage[k].trouble;
     tell(control_stage_name[k], "steps were not seen; what they fell in is not used", t->gaps);
     tell(control_stage_name[k], "commands acted later than one step", t->late);
-    tell(control_stage_name[k], "samples came with fault flags (saturated, late, held …)",
-         t->flagged);
+    for (unsigned bit = 0; bit < PB_FLAG_BITS; bit++)
+      tell(control_stage_name[k], pb_flag_text(bit), t->flag[bit]);
   }
 }
 

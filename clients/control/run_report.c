@@ -109,6 +109,10 @@ static void json_stage(pb_jsonout *o, const run_result *r, control_stage stage) 
   pb_jsonout_integer(o, "lines", a->lines);
   pb_jsonout_integer(o, "missed", s->trouble.gaps);
   pb_jsonout_integer(o, "flagged", s->trouble.flagged);
+  pb_jsonout_object(o, "flags");
+  for (unsigned bit = 0; bit < PB_FLAG_BITS; bit++)
+    pb_jsonout_integer(o, pb_flag_name(bit), s->trouble.flag[bit]);
+  pb_jsonout_object_end(o);
   pb_jsonout_numbers(o, "largest_input", s->largest, d->n);
   pb_jsonout_array(o, "rms");
   for (size_t i = 0; i < d->motions; i++) {

@@ -114,7 +114,7 @@ void pb_bench_tell_trouble(const pb_experiment *experiment) {
   const pb_experiment_trouble *t = pb_experiment_trouble_of(experiment);
   tell("steps were not seen; the periods or segments they fell in are not used", t->gaps);
   tell("commands acted later than one step", t->late);
-  tell("samples came with fault flags (saturated, late, held …)", t->flagged);
+  for (unsigned bit = 0; bit < PB_FLAG_BITS; bit++) tell(pb_flag_text(bit), t->flag[bit]);
   tell("steps at which another client moved an input that is not driven here", t->disturbed);
 }
 
@@ -124,12 +124,10 @@ pb_status pb_bench_choose(const pb_name_list *names, const pb_signal *signal, si
   *index = malloc((*chosen + 1) * sizeof **index);
   if (!*index) return pb_fail_memory(err, kind);
   pb_status status = PB_OK;
-  char flag[32];
-  snprintf(flag, sizeof flag, "--%s", kind);
   for (size_t k = 0; k < *chosen && status == PB_OK; k++) {
     (*index)[k] = k;
     if (names->count == 0) continue;
-    status = pb_signal_find(signal, count, kind, names->name[k], flag, &(*index)[k], err);
+    status = pb_signal_find(signal, count, kind, names->name[k], names->name[k], &(*index)[k], err);
     for (size_t j = 0; j < k && status == PB_OK; j++) {
       if ((*index)[j] != (*index)[k]) continue;
       status = pb_fail(err, PB_ERR_ARGUMENT, names->name[k], "this %s is named twice", kind);

@@ -207,6 +207,7 @@ static void take_pair(pb_experiment *e, const pb_sample *sample) {
 
 static void note_faults(pb_experiment *e, const pb_sample *sample) {
   e->trouble.flagged += sample->flags != 0;
+  pb_flags_count(sample->flags, e->trouble.flag);
   bool moved = false;
   for (size_t i = 0; i < sample->input_count; i++) {
     bool driven = false;

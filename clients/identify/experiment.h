@@ -15,6 +15,7 @@
 
 #include <stdio.h>
 
+#include "bus_flags.h"
 #include "control/lti.h"
 #include "session.h"
 #include "signal/frf.h"
@@ -77,8 +78,9 @@ typedef struct pb_experiment_trouble {
   uint64_t gaps;       // steps not seen (real time)
   uint64_t disturbed;  // steps at which an input that is not driven moved by more than its noise
   uint64_t flagged;    // samples with fault flags
-  uint64_t late;       // samples whose input was not the newest command (real time)
-  double decay;        // remove_transient: part of the change between periods that was a decay
+  uint64_t flag[PB_FLAG_BITS];  // of these, by flag (bus_flags.h)
+  uint64_t late;                // samples whose input was not the newest command (real time)
+  double decay;  // remove_transient: part of the change between periods that was a decay
 } pb_experiment_trouble;
 
 // Prepares everything; afterwards nothing is allocated in the callback. realtime: commands may act

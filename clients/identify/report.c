@@ -171,6 +171,10 @@ static void json_experiment(pb_jsonout *j, const identify_result *r) {
   pb_jsonout_number(j, "seconds", r->report.seconds);
   pb_jsonout_integer(j, "gaps", r->trouble->gaps);
   pb_jsonout_integer(j, "flagged", r->trouble->flagged);
+  pb_jsonout_object(j, "flags");
+  for (unsigned bit = 0; bit < PB_FLAG_BITS; bit++)
+    pb_jsonout_integer(j, pb_flag_name(bit), r->trouble->flag[bit]);
+  pb_jsonout_object_end(j);
   pb_jsonout_integer(j, "disturbed", r->trouble->disturbed);
   pb_jsonout_object_end(j);
 }

@@ -43,9 +43,6 @@ double monitor_nominal(const monitor_state *state);
 // The refusals' causes and counts; NULL ends the names.
 const char *monitor_refusal(const plantbus_Refusals *refused, size_t index, uint64_t *count);
 
-// The name of a fault bit.
-const char *monitor_fault(unsigned bit);
-
 // --- view_timing.c ---
 void monitor_view_timing(const monitor_state *state, screen *s);
 

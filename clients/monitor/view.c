@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "bus_flags.h"
 #include "monitor.h"
 
 const char *monitor_mode(plantbus_RunMode mode) {
@@ -24,11 +25,6 @@ const char *monitor_refusal(const plantbus_Refusals *r, size_t index, uint64_t *
   if (index >= sizeof name / sizeof *name) return NULL;
   *count = value[index];
   return name[index];
-}
-
-const char *monitor_fault(unsigned bit) {
-  static const char *const name[] = {"held", "late", "non_finite", "overrun", "saturated"};
-  return bit < sizeof name / sizeof *name ? name[bit] : "unknown";
 }
 
 static bool standing(const plantbus_PlantStatus *p) {
@@ -158,7 +154,7 @@ static void view_counters(const plantbus_PlantStatus *p, screen *s) {
 static void view_faults(const plantbus_PlantStatus *p, screen *s) {
   for (unsigned bit = 0; bit < 32; bit++) {
     if (!(p->faults >> bit & 1)) continue;
-    screen_put(s, SCREEN_ALARM, "fault %s", monitor_fault(bit));
+    screen_put(s, SCREEN_ALARM, "fault %s", pb_flag_name(bit));
     if (bit < p->fault_steps._length)
       screen_put(s, SCREEN_PLAIN, "  first at step %" PRIu64,
                  (uint64_t)p->fault_steps._buffer[bit]);
@@ -257,7 +253,7 @@ void monitor_line(const monitor_state *m, screen *s) {
              (uint64_t)p->dropped_samples);
   if (p->faults == 0) screen_put(s, SCREEN_PLAIN, " none");
   for (unsigned bit = 0; bit < 32; bit++)
-    if (p->faults >> bit & 1) screen_put(s, SCREEN_PLAIN, " %s", monitor_fault(bit));
+    if (p->faults >> bit & 1) screen_put(s, SCREEN_PLAIN, " %s", pb_flag_name(bit));
   for (uint32_t i = 0; i < p->attached._length; i++) {
     if (!p->attached._buffer[i].waited) continue;
     screen_put(s, SCREEN_PLAIN, "%s%s", *between ? between : " waits for ",

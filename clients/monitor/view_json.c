@@ -5,6 +5,7 @@
 #include <stdio.h>
 
 #include "histogram.h"
+#include "bus_flags.h"
 #include "monitor.h"
 
 static bool number(cJSON *object, const char *key, double value) {
@@ -70,7 +71,7 @@ static bool faults(cJSON *root, const plantbus_PlantStatus *p) {
   for (unsigned bit = 0; good && bit < 32; bit++) {
     if (!(p->faults >> bit & 1)) continue;
     cJSON *m = item(list);
-    good = m && text(m, "fault", monitor_fault(bit)) &&
+    good = m && text(m, "fault", pb_flag_name(bit)) &&
            number(m, "first_step",
                   bit < p->fault_steps._length ? (double)p->fault_steps._buffer[bit] : NAN);
   }

@@ -167,7 +167,7 @@ static void mistakes_are_named(void **state) {
   refused("hac " HEXAPOD " --bandwidth 100 --iff-gain 400 --disturbance Va1",
           "Va1: is an actuator");
   refused("hac " BENCH " --bandwidth 100", "Va: the plant has no output dL");
-  refused("hac " BENCH " --bandwidth 100 --metrology z", "z: the plant has no such output");
+  refused("hac " BENCH " --bandwidth 100 --metrology z", "z: the plant has no output 'z'; its outputs: Vs, y");
   refused("hac " BENCH " --bandwidth 100 --metrology y --frame cartesian --jacobian geometry",
           "no template");
   refused("hac /nowhere.json --bandwidth 100", "/nowhere.json");
