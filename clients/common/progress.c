@@ -3,7 +3,8 @@
 
 #include <string.h>
 #include <time.h>
-#include <unistd.h>
+
+#include "escapes.h"
 
 enum { BAR = 24 };
 
@@ -14,7 +15,7 @@ static double monotonic_seconds(void) {
 }
 
 void pb_progress_begin(pb_progress *progress, FILE *stream, const char *label) {
-  *progress = (pb_progress){.stream = stream, .on = isatty(fileno(stream)) == 1};
+  *progress = (pb_progress){.stream = stream, .on = pb_escapes(stream)};
   progress->begun = monotonic_seconds();
   progress->last = progress->begun - 1;
   snprintf(progress->label, sizeof progress->label, "%s", label);

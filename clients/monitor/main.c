@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "base/json.h"
+#include "escapes.h"
 #include "feed.h"
 #include "interrupt.h"
 #include "standard_output.h"
@@ -81,6 +82,8 @@ static pb_status print_json(const monitor_state *state, pb_error *err) {
 static pb_status print(const monitor_options *o, const monitor_state *state, pb_error *err) {
   pb_status status = PB_OK;
   screen s = {0};
+  size_t height;
+  if (o->once && isatty(STDOUT_FILENO)) terminal_size(&s.width, &height);
   if (o->json) {
     status = print_json(state, err);
   } else {
@@ -128,10 +131,14 @@ static pb_status run_stream(const monitor_options *o, feed *f, pb_error *err) {
 // ---- on a terminal ------------------------------------------------------------------------------
 
 static pb_status draw(const monitor_state *state, pb_error *err) {
-  screen s = {.terminal = true};
+  screen s = {.terminal = true, .plain = !pb_colours()};
   terminal_size(&s.width, &s.height);
+  const size_t height = s.height--;  // the last line is for what does not fit
   pb_text_append(&s.text, "\033[H");
   monitor_view(state, &s);
+  s.height = height;
+  if (s.left_out > 0) pb_text_append(&s.text, "\r\n");
+  if (s.left_out > 0) screen_put(&s, SCREEN_DIM, "… and %zu lines more", s.left_out);
   if (s.row < s.height) pb_text_append(&s.text, "\033[J");
   const pb_status status = s.text.failed ? pb_fail_memory(err, "view") : PB_OK;
   if (!status) fputs(s.text.text, stdout);
@@ -167,7 +174,7 @@ int main(int argc, char **argv) {
     ;
   else if (options.once)
     status = run_once(&options, f, &err);
-  else if (options.json || !isatty(STDOUT_FILENO))
+  else if (options.json || !pb_escapes(stdout))
     status = run_stream(&options, f, &err);
   else
     status = run_live(&options, f, &err);

@@ -43,6 +43,9 @@ double monitor_nominal(const monitor_state *state);
 // The refusals' causes and counts; NULL ends the names.
 const char *monitor_refusal(const plantbus_Refusals *refused, size_t index, uint64_t *count);
 
+// --- view_members.c ---
+void monitor_view_members(const plantbus_PlantStatus *status, screen *s);
+
 // --- view_timing.c ---
 void monitor_view_timing(const monitor_state *state, screen *s);
 

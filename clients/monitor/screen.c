@@ -44,9 +44,37 @@ void screen_put(screen *s, screen_style style, const char *format, ...) {
   va_end(arguments);
   begin(s);
   const bool styled = s->terminal && style != SCREEN_PLAIN;
-  if (styled) pb_text_append(&s->text, code[style]);
+  const bool coloured = style == SCREEN_WARN || style == SCREEN_ALARM;
+  if (styled) pb_text_append(&s->text, code[s->plain && coloured ? SCREEN_BOLD : style]);
   put_text(s, text);
   if (styled) pb_text_append(&s->text, "\033[0m");
+}
+
+// Characters of a text, as put_text counts them.
+static size_t characters(const char *text, size_t length) {
+  size_t count = 0;
+  for (size_t i = 0; i < length; i++) count += ((unsigned char)text[i] & 0xc0) != 0x80;
+  return count;
+}
+
+void screen_flow(screen *s, screen_style style, size_t indent, const char *format, ...) {
+  char text[1024];
+  va_list arguments;
+  va_start(arguments, format);
+  vsnprintf(text, sizeof text, format, arguments);
+  va_end(arguments);
+  for (const char *p = text; *p;) {
+    const size_t blanks = strspn(p, " "), length = strcspn(p + blanks, " ");
+    const size_t needed = s->column + blanks + characters(p + blanks, length);
+    if (s->width > 0 && needed > s->width && s->column > indent) {
+      screen_line(s);
+      screen_put(s, SCREEN_PLAIN, "%*s", (int)indent, "");
+      p += blanks;
+    } else {
+      screen_put(s, style, "%.*s", (int)(blanks + length), p);
+      p += blanks + length;
+    }
+  }
 }
 
 void screen_to(screen *s, size_t column) {

@@ -21,6 +21,7 @@ typedef struct screen {
   pb_text text;
   size_t width, height;  // 0: unlimited
   bool terminal;         // escapes may be used
+  bool plain;            // … but no colours: what has one is bold
   bool begun;            // the line is
   size_t column, row;    // of the next character
   size_t left_out;       // lines that did not fit
@@ -29,6 +30,11 @@ typedef struct screen {
 // Appends to the line. [any]
 void screen_put(screen *s, screen_style style, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
+
+// Appends words; those for which the line has no room go on in a new one, behind `indent` blanks.
+// [any]
+void screen_flow(screen *s, screen_style style, size_t indent, const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
 
 // Blanks up to a column (not before where the line is now, and at least one after a text).
 void screen_to(screen *s, size_t column);

@@ -27,17 +27,13 @@ const char *monitor_refusal(const plantbus_Refusals *r, size_t index, uint64_t *
   return name[index];
 }
 
-static bool standing(const plantbus_PlantStatus *p) {
-  return p->mode == plantbus_LOCKSTEP && p->steps_per_second == 0.0;
-}
-
 static void view_head(const monitor_state *m, screen *s) {
   const plantbus_PlantDescription *d = m->description;
   const plantbus_PlantStatus *p = m->status;
   screen_put(s, SCREEN_BOLD, "%s", d->name);
-  screen_put(s, SCREEN_DIM, "  %u states, %u inputs, %u outputs, %s", d->states,
-             d->input_names._length, d->output_names._length, m->daemon);
-  if (m->gone) screen_put(s, SCREEN_ALARM, "  THE DAEMON HAS GONE");
+  screen_flow(s, SCREEN_DIM, 2, "  %u states, %u inputs, %u outputs, %s", d->states,
+              d->input_names._length, d->output_names._length, m->daemon);
+  if (m->gone) screen_flow(s, SCREEN_ALARM, 2, "  THE DAEMON HAS GONE");
   screen_line(s);
   if (!p) {
     screen_put(s, SCREEN_DIM, "no status yet");
@@ -45,86 +41,30 @@ static void view_head(const monitor_state *m, screen *s) {
     return;
   }
   screen_put(s, SCREEN_BOLD, "%s", monitor_mode(p->mode));
-  if (p->mode == plantbus_REALTIME) screen_put(s, SCREEN_PLAIN, " × %g", p->speed);
-  screen_put(s, SCREEN_PLAIN, "  %.0f / %.0f steps/s", p->steps_per_second, monitor_nominal(m));
+  if (p->mode == plantbus_REALTIME) screen_flow(s, SCREEN_PLAIN, 2, " × %g", p->speed);
+  screen_flow(s, SCREEN_PLAIN, 2, "  %.0f / %.0f steps/s", p->steps_per_second, monitor_nominal(m));
   if (monitor_nominal(m) > 0.0)
-    screen_put(s, SCREEN_DIM, " (%.0f %%)", 100.0 * p->steps_per_second / monitor_nominal(m));
-  screen_put(s, SCREEN_PLAIN, "  epoch %u  revision %u", p->epoch, p->revision);
-  if (p->decimation > 1) screen_put(s, SCREEN_PLAIN, "  every %uth sample", p->decimation);
-  if (p->configuring) screen_put(s, SCREEN_WARN, "  a changed model is on its way");
+    screen_flow(s, SCREEN_DIM, 2, " (%.0f %%)", 100.0 * p->steps_per_second / monitor_nominal(m));
+  screen_flow(s, SCREEN_PLAIN, 2, "  epoch %u  revision %u", p->epoch, p->revision);
+  if (p->decimation > 1) screen_flow(s, SCREEN_PLAIN, 2, "  every %uth sample", p->decimation);
+  if (p->configuring) screen_flow(s, SCREEN_WARN, 2, "  a changed model is on its way");
   screen_line(s);
   const uint64_t step = m->has_sample && m->sample.epoch == p->epoch && m->sample.step > p->step
                             ? m->sample.step
                             : p->step;
-  screen_put(s, SCREEN_PLAIN, "step %" PRIu64 "  t = %.6f s  hash %016" PRIx64 " at %" PRIu64, step,
-             (double)step / d->sample_rate, p->hash, p->hash_step);
+  screen_flow(s, SCREEN_PLAIN, 2, "step %" PRIu64 "  t = %.6f s  hash %016" PRIx64 " at %" PRIu64,
+              step, (double)step / d->sample_rate, p->hash, p->hash_step);
   screen_line(s);
 }
 
-// ---- members, hosted ----------------------------------------------------------------------------
-
-static const size_t stop[] = {24, 38, 43, 48, 53, 64, 71, 78};  // columns of the members' table
-
-// Who keeps a plant that stands still waiting.
-static void waits(const plantbus_PlantStatus *p, screen *s) {
-  bool any = false;
-  if (!standing(p)) return;
-  for (uint32_t i = 0; i < p->attached._length; i++) {
-    if (!p->attached._buffer[i].waited) continue;
-    screen_put(s, SCREEN_ALARM, "%s%s", any ? ", " : "stands still, waits for ",
-               p->attached._buffer[i].client_name);
-    any = true;
-  }
-  if (any) screen_line(s);
-}
-
-static void view_members(const plantbus_PlantStatus *p, screen *s) {
-  static const char *const head[] = {"client",   "channel", "prio", "acts",  "bar.",
-                                     "commands", "late",    "age",  "oldest"};
-  screen_line(s);
-  if (p->attached._length == 0) {
-    screen_put(s, SCREEN_DIM, "nobody is attached");
-    screen_line(s);
-    return;
-  }
-  for (size_t c = 0; c < 9; c++) {
-    if (c > 0) screen_to(s, stop[c - 1]);
-    screen_put(s, SCREEN_DIM, "%s", head[c]);
-  }
-  screen_line(s);
-  for (uint32_t i = 0; i < p->attached._length; i++) {
-    const plantbus_Attached *a = &p->attached._buffer[i];
-    // In lockstep a plant that runs waits for someone at any moment.
-    const screen_style style = a->waited && standing(p) ? SCREEN_ALARM
-                               : a->late                ? SCREEN_WARN
-                                                        : SCREEN_PLAIN;
-    screen_put(s, style, "%s%.21s", a->waited ? "*" : "", a->client_name);
-    screen_to(s, stop[0]);
-    screen_put(s, SCREEN_PLAIN, "%.12s", a->channel);
-    screen_to(s, stop[1]);
-    screen_put(s, SCREEN_PLAIN, "%d", a->priority);
-    screen_to(s, stop[2]);
-    screen_put(s, SCREEN_PLAIN, "%s", a->acting ? "yes" : "no");
-    screen_to(s, stop[3]);
-    screen_put(s, SCREEN_PLAIN, "%s", a->barrier ? "yes" : "no");
-    screen_to(s, stop[4]);
-    screen_put(s, SCREEN_PLAIN, "%" PRIu64, a->commands);
-    screen_to(s, stop[5]);
-    screen_put(s, a->late ? SCREEN_WARN : SCREEN_PLAIN, "%" PRIu64, a->late);
-    screen_to(s, stop[6]);
-    screen_put(s, SCREEN_PLAIN, "%" PRIu64, a->age);
-    screen_to(s, stop[7]);
-    screen_put(s, SCREEN_PLAIN, "%" PRIu64, a->age_max);
-    screen_line(s);
-  }
-  waits(p, s);
-}
+// ---- hosted
+// --------------------------------------------------------------------------------------
 
 static void view_hosted(const plantbus_PlantStatus *p, screen *s) {
   for (uint32_t i = 0; i < p->hosted._length; i++) {
     const plantbus_Hosted *h = &p->hosted._buffer[i];
-    screen_put(s, SCREEN_PLAIN, "hosted  %s on %s, by %s%s", h->kind, h->channel, h->client_name,
-               h->done ? ", done" : "");
+    screen_flow(s, SCREEN_PLAIN, 2, "hosted  %s on %s, by %s%s", h->kind, h->channel,
+                h->client_name, h->done ? ", done" : "");
     screen_line(s);
   }
 }
@@ -138,16 +78,17 @@ static void view_counters(const plantbus_PlantStatus *p, screen *s) {
   for (size_t i = 0; monitor_refusal(&p->refused, i, &count); i++) {
     sum += count;
     if (count)
-      screen_put(s, SCREEN_WARN, " %s %" PRIu64, monitor_refusal(&p->refused, i, &count), count);
+      screen_flow(s, SCREEN_WARN, 2, " %s %" PRIu64, monitor_refusal(&p->refused, i, &count),
+                  count);
   }
-  if (sum == 0) screen_put(s, SCREEN_PLAIN, " none");
-  screen_put(s, p->late ? SCREEN_WARN : SCREEN_PLAIN, "   late %" PRIu64, p->late);
-  screen_put(s, p->overruns ? SCREEN_WARN : SCREEN_PLAIN, "   overruns %" PRIu64, p->overruns);
-  screen_put(s, p->skipped ? SCREEN_WARN : SCREEN_PLAIN, "   skipped %" PRIu64, p->skipped);
-  screen_put(s, p->dropped_samples ? SCREEN_WARN : SCREEN_PLAIN, "   dropped %" PRIu64,
-             p->dropped_samples);
+  if (sum == 0) screen_flow(s, SCREEN_PLAIN, 2, " none");
+  screen_flow(s, p->late ? SCREEN_WARN : SCREEN_PLAIN, 2, "   late %" PRIu64, p->late);
+  screen_flow(s, p->overruns ? SCREEN_WARN : SCREEN_PLAIN, 2, "   overruns %" PRIu64, p->overruns);
+  screen_flow(s, p->skipped ? SCREEN_WARN : SCREEN_PLAIN, 2, "   skipped %" PRIu64, p->skipped);
+  screen_flow(s, p->dropped_samples ? SCREEN_WARN : SCREEN_PLAIN, 2, "   dropped %" PRIu64,
+              p->dropped_samples);
   if (p->overrun_policy && p->overrun_policy[0])
-    screen_put(s, SCREEN_DIM, "   on overrun: %s", p->overrun_policy);
+    screen_flow(s, SCREEN_DIM, 2, "   on overrun: %s", p->overrun_policy);
   screen_line(s);
 }
 
@@ -170,57 +111,100 @@ static void view_events(const monitor_state *m, screen *s) {
     screen_to(s, 16);
     screen_put(s, SCREEN_PLAIN, "%s", e->kind);
     screen_to(s, 30);
-    screen_put(s, SCREEN_PLAIN, "%s", e->message);
+    screen_flow(s, SCREEN_PLAIN, 16, "%s", e->message);
     screen_line(s);
   }
 }
 
 // ---- signals ------------------------------------------------------------------------------------
 
-enum { BAR = 20 };
+enum { BAR_MOST = 40, BAR_LEAST = 5, VALUE = 15, RANGE = 20, LABEL_MOST = 32 };
 
-// Where the value lies between the least and the most that was seen.
-static void bar(double value, double least, double most, char text[BAR + 1]) {
-  int at = most > least ? (int)lround((value - least) / (most - least) * (BAR - 1)) : BAR / 2;
+// How the width is shared: the label's column, and the bar between least and most (0: no room).
+typedef struct signal_layout {
+  size_t label, bar;
+  bool range;  // least and most have room
+} signal_layout;
+
+// Where the value lies between the least and the most that was seen, in `length` characters.
+static void bar(double value, double least, double most, size_t length, char *text) {
+  const long last = (long)length - 1;
+  long at = most > least ? lround((value - least) / (most - least) * (double)last) : last / 2;
   if (at < 0) at = 0;
-  if (at > BAR - 1) at = BAR - 1;
-  memset(text, '-', BAR);
+  if (at > last) at = last;
+  memset(text, '-', length);
   text[at] = '|';
-  text[BAR] = '\0';
+  text[length] = '\0';
 }
 
-static void view_signal(const monitor_state *m, screen *s, const char *name, const char *unit,
-                        bool known, double value, size_t index) {
-  char text[BAR + 1];
-  screen_put(s, SCREEN_PLAIN, "%.30s", name);
+static size_t longest(char *const *name, char *const *unit, uint32_t count, size_t so_far) {
+  for (uint32_t i = 0; i < count; i++) {
+    const size_t length = strlen(name[i]) + strlen(unit[i]) + 4;  // "name [unit] "
+    if (length > so_far) so_far = length;
+  }
+  return so_far;
+}
+
+static signal_layout layout(const plantbus_PlantDescription *d, size_t width) {
+  signal_layout l = {.label = LABEL_MOST, .bar = 20, .range = true};
+  if (width == 0) return l;
+  size_t wanted =
+      longest(d->input_names._buffer, d->input_units._buffer, d->input_names._length, 8);
+  wanted =
+      longest(d->output_names._buffer, d->output_units._buffer, d->output_names._length, wanted);
+  if (wanted < l.label) l.label = wanted;
+  if (l.label + VALUE > width) l.label = width > VALUE + 8 ? width - VALUE : 8;
+  const size_t used = l.label + VALUE + RANGE;
+  l.range = used < width;  // a character at least between least and most
+  l.bar = l.range && width >= used + BAR_LEAST ? width - used : 0;
+  if (l.bar > BAR_MOST) l.bar = BAR_MOST;
+  return l;
+}
+
+static void view_range(const monitor_state *m, screen *s, const signal_layout *l, double value,
+                       size_t index) {
+  char text[BAR_MOST + 1] = "…";
+  if (!l->range) return;
+  if (l->bar > 0) bar(value, m->least[index], m->most[index], l->bar, text);
+  screen_put(s, SCREEN_DIM, "%+.2e %s %+.2e", m->least[index], text, m->most[index]);
+}
+
+static void view_signal(const monitor_state *m, screen *s, const signal_layout *l, const char *name,
+                        const char *unit, bool known, double value, size_t index) {
+  const size_t taken = strlen(unit) + 4;
+  const size_t room = l->label > taken ? l->label - taken : 1;
+  screen_put(s, SCREEN_PLAIN, "%.*s", (int)room, name);
   screen_put(s, SCREEN_DIM, " [%.10s]", unit);
-  screen_to(s, 32);
+  screen_to(s, l->label);
   if (!known) {
     screen_put(s, SCREEN_DIM, "–");
   } else if (!isfinite(value)) {
     screen_put(s, SCREEN_ALARM, "%g", value);
   } else {
-    bar(value, m->least[index], m->most[index], text);
     screen_put(s, SCREEN_PLAIN, "%+.6e  ", value);
-    screen_put(s, SCREEN_DIM, "%+.2e %s %+.2e", m->least[index], text, m->most[index]);
+    view_range(m, s, l, value, index);
   }
   screen_line(s);
 }
 
 static void view_signals(const monitor_state *m, screen *s) {
   const plantbus_PlantDescription *d = m->description;
+  const signal_layout l = layout(d, s->width);
   screen_line(s);
   screen_put(s, SCREEN_DIM, "signal");
-  screen_to(s, 32);
-  screen_put(s, SCREEN_DIM, "value          least and most of %" PRIu64 " samples looked at",
-             m->seen);
+  screen_to(s, l.label);
+  screen_put(s, SCREEN_DIM, "value");
+  screen_to(s, l.label + VALUE);
+  if (l.range)
+    screen_put(s, SCREEN_DIM, "least and most of %" PRIu64 " %s", m->seen,
+               s->width == 0 || l.bar > 14 ? "samples looked at" : "samples");
   screen_line(s);
   for (uint32_t i = 0; i < d->input_names._length; i++)
-    view_signal(m, s, d->input_names._buffer[i], d->input_units._buffer[i],
+    view_signal(m, s, &l, d->input_names._buffer[i], d->input_units._buffer[i],
                 m->has_sample && i < m->sample.input_count && i < plantbus_MAX_INPUTS,
                 m->sample.input[i % plantbus_MAX_INPUTS], i);
   for (uint32_t i = 0; i < d->output_names._length; i++)
-    view_signal(m, s, d->output_names._buffer[i], d->output_units._buffer[i],
+    view_signal(m, s, &l, d->output_names._buffer[i], d->output_units._buffer[i],
                 m->has_sample && i < m->sample.output_count && i < plantbus_MAX_OUTPUTS,
                 m->sample.output[i % plantbus_MAX_OUTPUTS], plantbus_MAX_INPUTS + i);
 }
@@ -228,7 +212,7 @@ static void view_signals(const monitor_state *m, screen *s) {
 void monitor_view(const monitor_state *m, screen *s) {
   view_head(m, s);
   if (m->status) {
-    view_members(m->status, s);
+    monitor_view_members(m->status, s);
     view_hosted(m->status, s);
     view_counters(m->status, s);
     monitor_view_timing(m, s);

@@ -128,6 +128,50 @@ static void the_view_shows_everything(void **state) {
   free(s.text.text);
 }
 
+static size_t characters(const char *text, const char *end) {
+  size_t count = 0;
+  for (; text < end; text++) count += ((unsigned char)*text & 0xc0) != 0x80;
+  return count;
+}
+
+// Whatever the width, no line reaches it without its end, and nothing that one steers by is cut.
+static void the_view_fits_its_width(void **state) {
+  (void)state;
+  const plantbus_PlantDescription d = description();
+  const plantbus_PlantStatus p = status();
+  monitor_state m = {.description = &d, .status = &p, .has_sample = true, .seen = 12};
+  m.sample.input_count = m.sample.output_count = 1;
+  m.least[0] = -1.5;
+  for (size_t width = 40; width <= 120; width += 5) {
+    screen s = {.width = width};
+    monitor_view(&m, &s);
+    for (const char *line = s.text.text, *end; (end = strchr(line, '\n')); line = end + 1)
+      if (characters(line, end) > width) fail_msg("%zu: %.*s", width, (int)(end - line), line);
+    expect(s.text.text, "loop[1]");
+    expect(s.text.text, "skipped");
+    if (width >= 50) expect(s.text.text, "-1.50e+00");
+    if (width >= 80) expect(s.text.text, "oldest");
+    if (width >= 80) expect(s.text.text, "--|--");
+    free(s.text.text);
+  }
+  screen s = {.width = 20};
+  screen_flow(&s, SCREEN_PLAIN, 2, "one two three four five");
+  screen_flow(&s, SCREEN_PLAIN, 2, "  six sevensevensevenseven");
+  screen_line(&s);
+  assert_string_equal(s.text.text, "one two three four\n  five  six\n  sevensevensevensev\n");
+  free(s.text.text);
+}
+
+// Without colours what has one is bold.
+static void colours_may_be_unwanted(void **state) {
+  (void)state;
+  screen s = {.width = 10, .height = 3, .terminal = true, .plain = true};
+  screen_put(&s, SCREEN_ALARM, "a");
+  screen_put(&s, SCREEN_DIM, "b");
+  assert_string_equal(s.text.text, "\033[K\033[1ma\033[0m\033[2mb\033[0m");
+  free(s.text.text);
+}
+
 static void realtime_is_measured_against_its_speed(void **state) {
   (void)state;
   const plantbus_PlantDescription d = description();
@@ -169,6 +213,8 @@ int main(void) {
       cmocka_unit_test(lines_are_cut_and_cleaned),
       cmocka_unit_test(a_terminal_gets_escapes),
       cmocka_unit_test(the_view_shows_everything),
+      cmocka_unit_test(the_view_fits_its_width),
+      cmocka_unit_test(colours_may_be_unwanted),
       cmocka_unit_test(realtime_is_measured_against_its_speed),
       cmocka_unit_test(json_holds_what_the_status_does),
   };
