@@ -171,6 +171,10 @@ static pb_status mat_put(const pb_recording *r, const exporting *e, const char *
   pb_status status = pb_matfile_open(path, &mat, err);
   if (status) return status;
   pb_matfile_text(mat, "plant", r->plant);
+  pb_matfile_text(
+      mat, "convention",
+      "row k: y(k) beside u(k-1), the input held over the interval that ended at step k; "
+      "y(k) = C x(k) + D u(k-1)");
   pb_matfile_text(mat, "plant_text", c->of->plant_text ? c->of->plant_text : "");
   pb_matfile_text(mat, "plant_sha256", c->of->sha256);
   pb_matfile_scalar(mat, "sample_rate", c->of->sample_rate);

@@ -64,6 +64,11 @@ static pb_status compute(step *s, pb_error *err) {
   return status;
 }
 
+// In the files themselves.
+static const char convention[] =
+    "output at step k is y(k) = C x(k) + D u(k-1), sampled before u(k) acts; the input has its "
+    "amplitude over [k, k+1) from k = 0 on, and is 0 before: y(0) = 0.";
+
 // ---- writing ------------------------------------------------------------------------------------
 
 static void step_json(pb_jsonout *json, const void *context) {
@@ -72,6 +77,7 @@ static void step_json(pb_jsonout *json, const void *context) {
   pb_jsonout_text(json, "input", s->ch.input_name[0]);
   pb_jsonout_number(json, "amplitude", s->t->amplitude);
   pb_jsonout_number(json, "sample_rate", s->model->sample_rate);
+  pb_jsonout_text(json, "convention", convention);
   pb_jsonout_texts(json, "outputs", s->ch.output_name, s->ch.outputs);
   pb_jsonout_numbers(json, "step", s->number, s->count);
   pb_jsonout_array(json, "output");
@@ -134,6 +140,7 @@ static pb_status step_mat(const step *s, pb_error *err) {
   pb_status status = pb_matfile_open(s->t->out, &mat, err);
   if (status) return status;
   pb_matfile_text(mat, "plant", s->model->name);
+  pb_matfile_text(mat, "convention", convention);
   pb_matfile_text(mat, "input", s->ch.input_name[0]);
   pb_matfile_scalar(mat, "amplitude", s->t->amplitude);
   pb_matfile_scalar(mat, "Ts", 1 / s->model->sample_rate);

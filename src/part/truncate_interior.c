@@ -24,8 +24,8 @@ static double *block(const double *x, size_t n, size_t row, size_t rows, size_t 
   return out;
 }
 
-// Of p eigenvalues, ascending: the first stands out of their rounding, p ε of the last. A coordinate
-// that nothing holds has one of either sign there, by the processor's kernels.
+// Of p eigenvalues, ascending: the first stands out of their rounding, p ε of the last. A
+// coordinate that nothing holds has one of either sign there, by the processor's kernels.
 static bool all_held(const double *lambda, size_t p) {
   return lambda[0] > 8 * (double)p * DBL_EPSILON * lambda[p - 1];
 }

@@ -7,11 +7,14 @@
 
 #include "support/check.h"
 
+#include "model/model.h"
+
 extern char **environ;
 
 #define BENCH PB_CONFIG "/plants/apa300ml-bench.json"
 #define ELECTRONICS PB_CONFIG "/plants/apa300ml-bench-electronics.json"
 #define HEXAPOD PB_CONFIG "/plants/nano-hexapod.json"
+#define ONE_DOF PB_CONFIG "/plants/nano-hexapod-1dof.json"  // D is not 0
 
 enum { MOST_ARGUMENTS = 24 };
 
@@ -397,6 +400,59 @@ static void test_export(void **state) {
   cJSON_Delete(tree);
 }
 
+// The standard form of an export, y = C ξ + D u, is the stepped plant, whatever the inputs do: also
+// where D is not 0.
+static void test_export_standard(void **state) {
+  (void)state;
+  enum { STEPS = 400 };
+  pb_model *m;
+  REQUIRE(pb_model_load(ONE_DOF, NULL, &m, &err));
+  const char *path = path_of("standard.mat");
+  assert_int_equal(run("export " ONE_DOF " -o %s", path), 0);
+  mat_t *mat = Mat_Open(path, MAT_ACC_RDONLY);
+  assert_non_null(mat);
+  matvar_t *held = Mat_VarRead(mat, "held"), *text = Mat_VarRead(mat, "convention"), *v[4];
+  assert_true(held && text && held->dims[0] > 0);
+  const size_t n = m->nx + held->dims[0], nu = m->nu, ny = m->ny;
+  const double *a = real_variable(mat, "A_ss", n, n, &v[0]);
+  const double *b = real_variable(mat, "B_ss", n, nu, &v[1]);
+  const double *c = real_variable(mat, "C_ss", ny, n, &v[2]);
+  const double *d = real_variable(mat, "D_ss", ny, nu, &v[3]);
+  pb_state *plant = pb_state_new(m);
+  double *x = calloc(2 * n, sizeof *x), *next = x + n, *u = calloc(nu, sizeof *u);
+  double *y = calloc(ny, sizeof *y), *largest = calloc(2 * ny, sizeof *largest);
+  double *error = largest + ny;
+  for (size_t k = 0; k < STEPS; k++) {
+    for (size_t i = 0; i < nu; i++)
+      u[i] = sin(0.01 * (double)(k * (i + 1))) > 0 ? 1.0 + (double)i : -0.5;
+    pb_step_output(m, plant, y);
+    for (size_t o = 0; o < ny; o++) {
+      double sum = 0;
+      for (size_t j = 0; j < n; j++) sum += c[o + j * ny] * x[j];
+      for (size_t i = 0; i < nu; i++) sum += d[o + i * ny] * u[i];
+      largest[o] = fmax(largest[o], fabs(y[o]));
+      error[o] = fmax(error[o], fabs(sum - y[o]));
+    }
+    for (size_t r = 0; r < n; r++) {
+      next[r] = 0;
+      for (size_t j = 0; j < n; j++) next[r] += a[r + j * n] * x[j];
+      for (size_t i = 0; i < nu; i++) next[r] += b[r + i * n] * u[i];
+    }
+    memcpy(x, next, n * sizeof *x);
+    pb_step_advance(m, plant, u);
+  }
+  for (size_t o = 0; o < ny; o++) {
+    assert_true(largest[o] > 0);
+    ASSERT_NEAR(error[o], 0, 1e-9 * largest[o]);
+  }
+  for (int k = 0; k < 4; k++) Mat_VarFree(v[k]);
+  Mat_VarFree(held), Mat_VarFree(text);
+  Mat_Close(mat);
+  unlink(path);
+  free(plant), free(x), free(u), free(y), free(largest);
+  pb_model_free(m);
+}
+
 // Every command writes each of its formats, and the same bytes each time.
 static void test_formats(void **state) {
   (void)state;
@@ -534,6 +590,7 @@ int main(void) {
       cmocka_unit_test(test_step),
       cmocka_unit_test(test_csv),
       cmocka_unit_test(test_export),
+      cmocka_unit_test(test_export_standard),
       cmocka_unit_test(test_formats),
       cmocka_unit_test(test_tables),
       cmocka_unit_test(test_hexapod),
