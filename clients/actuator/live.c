@@ -70,8 +70,7 @@ static pb_status choose_experiment(const live_options *o, const pb_bench *bench,
   if (e->resolution == 0) e->resolution = 0.5;
   if (e->averages == 0) e->averages = 2;
   if (o->excite.settle_given) return PB_OK;
-  e->remove_transient = !bench->realtime;
-  return pb_settle_seconds(bench->model, e->f1, e->f2, e->remove_transient, &e->settle, err);
+  return pb_settle_seconds(bench->model, e->f1, e->f2, !bench->realtime, &e->settle, err);
 }
 
 static pb_status find(const pb_model *m, bool input, const char *name, const char *flag,

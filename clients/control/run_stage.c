@@ -60,7 +60,6 @@ static pb_status settle(const run_result *r, control_stage stage, double *second
 static pb_status make_experiment(const run_result *r, control_stage stage, pb_experiment **out,
                                  pb_error *err) {
   pb_experiment_options e = r->experiment;
-  e.remove_transient = e.excitation != PB_EXCITE_NOISE && !r->bench->realtime;
   pb_status status = PB_OK;
   if (!r->design->options->iff.excite.settle_given) status = settle(r, stage, &e.settle, err);
   e.settle += (double)pb_model_delay(r->design->model) / r->design->model->sample_rate;

@@ -123,6 +123,8 @@ pb_status pb_experiment_begin(pb_experiment *e, pb_error *err) {
   pb_status status = pb_experiment_draw(e, err);
   if (status != PB_OK) return status;
   e->begun = true;
+  // A round that settles anew does not go on where the last one ended.
+  if (e->averages && pb_experiment_layout_of(e).settle > 0) pb_periodic_break(e->averages);
   e->started = e->previous_known = e->ending = false;
   e->gap_until = 0;
   if (e->realtime || e->round == 0)
@@ -358,11 +360,10 @@ static pb_status merge_columns(const pb_experiment *e, pb_frf *out, pb_error *er
 
 pb_status pb_experiment_estimate(pb_experiment *e, pb_frf *out, pb_error *err) {
   pb_status status = PB_OK;
-  // Records with gaps are left as they are: they are not the steady state's, and say so by their
-  // scatter.
-  if (e->averages && e->options.remove_transient && e->trouble.gaps == 0 && !e->settled) {
+  if (e->averages) {
     status = pb_transient_remove(e->averages, e->model->sample_rate, &e->trouble.decay, err);
-    e->settled = status == PB_OK;
+    // Without periods in a row nothing can be told apart; their scatter tells.
+    if (status == PB_ERR_STATE) status = PB_OK;
   }
   if (status != PB_OK) return status;
   if (e->averages) {

@@ -30,12 +30,11 @@ typedef enum pb_excitation {
 
 typedef struct pb_experiment_options {
   pb_excitation excitation;
-  double f1, f2;          // Hz
-  double rms;             // of each command, in its unit (chirp: amplitude = √2 rms)
-  double resolution;      // Hz: one over the period or the segment
-  size_t averages;        // periods, or segments, measured in one round of a stage
-  double settle;          // seconds at the start of each stage that are not used
-  bool remove_transient;  // periodic: take the decay of the start out (transient.h); one round only
+  double f1, f2;      // Hz
+  double rms;         // of each command, in its unit (chirp: amplitude = √2 rms)
+  double resolution;  // Hz: one over the period or the segment
+  size_t averages;    // periods, or segments, measured in one round of a stage
+  double settle;      // seconds at the start of each stage that are not used
   bool one_at_a_time;
   uint64_t seed;
   pb_window window;        // noise
@@ -80,7 +79,7 @@ typedef struct pb_experiment_trouble {
   uint64_t flagged;    // samples with fault flags
   uint64_t flag[PB_FLAG_BITS];  // of these, by flag (bus_flags.h)
   uint64_t late;                // samples whose input was not the newest command (real time)
-  double decay;  // remove_transient: part of the change between periods that was a decay
+  double decay;                 // periodic: part of the change between periods that was free motion
 } pb_experiment_trouble;
 
 // Prepares everything; afterwards nothing is allocated in the callback. realtime: commands may act
@@ -111,8 +110,8 @@ pb_status pb_experiment_run_blocks(pb_experiment *experiment, pb_session *sessio
 // Steps that the next round takes.
 uint64_t pb_experiment_round_steps(const pb_experiment *experiment);
 
-// The estimate of all rounds so far, [nf][outputs][inputs] of the channels. With remove_transient
-// no further round is possible. [init]
+// The estimate of all rounds so far, [nf][outputs][inputs] of the channels. Of periodic excitation
+// the free motion that the periods still hold is taken out first (transient.h). [init]
 pb_status pb_experiment_estimate(pb_experiment *experiment, pb_frf *out, pb_error *err);
 
 const pb_experiment_trouble *pb_experiment_trouble_of(const pb_experiment *experiment);

@@ -27,7 +27,6 @@ struct pb_experiment {
   pb_periodic *averages;
   pb_welch **welch;  // [welches] one, or one an input
   size_t welches;
-  bool settled;  // the transient has been removed
 
   // The round under way; touched by the callback only.
   bool begun, started, previous_known, ending;

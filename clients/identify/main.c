@@ -92,7 +92,6 @@ static pb_status choose_settling(const identify_options *o, const pb_bench *benc
                                  pb_experiment_options *e, pb_error *err) {
   bool removable = e->excitation != PB_EXCITE_NOISE && !bench->realtime && o->coherence_target == 0;
   if (o->excite.settle_given) return PB_OK;
-  e->remove_transient = removable;
   pb_status status = pb_settle_seconds(bench->model, e->f1, e->f2, removable, &e->settle, err);
   if (e->excitation == PB_EXCITE_NOISE && !e->one_at_a_time) e->settle = 0;
   return status;

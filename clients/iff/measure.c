@@ -35,7 +35,6 @@ static pb_status make_experiment(iff_result *r, bool closed, pb_experiment **out
   bool removable = e.excitation != PB_EXCITE_NOISE && !r->bench->realtime;
   pb_status status = PB_OK;
   if (!r->options->excite.settle_given) {
-    e.remove_transient = removable;
     status = closed ? settle_closed(r, removable, &e.settle, err)
                     : settle_open(r, removable, &e.settle, err);
   }

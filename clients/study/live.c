@@ -117,10 +117,8 @@ static pb_status estimate(const live *l, pb_bench *bench, const pb_experiment_ch
                              .rms = 1,
                              .resolution = 0.5,
                              .averages = 2,
-                             .seed = 1,
-                             .remove_transient = !bench->realtime};
-  pb_status status =
-      pb_settle_seconds(bench->model, e.f1, e.f2, e.remove_transient, &e.settle, err);
+                             .seed = 1};
+  pb_status status = pb_settle_seconds(bench->model, e.f1, e.f2, !bench->realtime, &e.settle, err);
   if (!status)
     status = pb_experiment_new(bench->model, channels, NULL, &e, bench->realtime, &experiment, err);
   if (!status) status = pb_experiment_begin(experiment, err);

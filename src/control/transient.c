@@ -45,8 +45,8 @@ pb_status pb_transient_remove(pb_periodic *periodic, double sample_rate, double 
   if (channels > 0) status = pb_fit_frf(&difference, channel, channels, &options, &fit, err);
   // A difference that no poles fit is not a decay.
   if (status == PB_ERR_NUMERIC || status == PB_ERR_ARGUMENT) status = PB_OK;
-  if (status == PB_OK && fit.poles > 0) {
-    pole = malloc(fit.poles * sizeof *pole);
+  if (status == PB_OK) {
+    pole = malloc((fit.poles + 1) * sizeof *pole);
     if (!pole) status = pb_fail_memory(err, "transient");
     for (size_t k = 0; pole && k < fit.poles; k++) pole[k] = fit.pole[k].z;
     if (pole) status = pb_periodic_settle(periodic, pole, fit.poles, &part, err);

@@ -1,4 +1,5 @@
 // Averaged periods of periodic experiments: see periodic.h.
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,18 +9,28 @@
 #include "signal/small_solve.h"
 
 static bool allocate(pb_periodic *p) {
-  size_t n = p->options.period, experiments = p->options.experiments;
-  p->count = calloc(experiments, sizeof *p->count);
-  p->record = malloc(p->signals * n * sizeof *p->record);
+  size_t n = p->options.period, ne = p->options.experiments, ns = p->signals, lines = p->lines;
+  p->count = calloc(ne, sizeof *p->count);
+  p->runs = calloc(3 * ne, sizeof *p->runs);
+  p->uneven = calloc(ne, sizeof *p->uneven);
+  p->record = malloc(ns * n * sizeof *p->record);
   p->work = malloc(n * sizeof *p->work);
-  p->line = malloc(p->signals * p->lines * sizeof *p->line);
-  p->mean = calloc(experiments * p->signals * p->lines, sizeof *p->mean);
-  p->scatter = calloc(experiments * p->ny * p->lines, sizeof *p->scatter);
-  p->first_period = calloc(experiments * p->ny * p->lines, sizeof *p->first_period);
-  p->last_period = calloc(experiments * p->ny * p->lines, sizeof *p->last_period);
-  p->broken = calloc(experiments, sizeof *p->broken);
-  if (!p->first_period || !p->last_period || !p->broken) return false;
-  return p->count && p->record && p->work && p->line && p->mean && p->scatter;
+  p->line = malloc(ns * p->all * sizeof *p->line);
+  p->previous = malloc(ns * p->all * sizeof *p->previous);
+  p->mean = calloc(ne * ns * lines, sizeof *p->mean);
+  p->peak = calloc(ne * ns, sizeof *p->peak);
+  p->scatter = calloc(ne * p->ny * lines, sizeof *p->scatter);
+  p->cross = calloc(ne * p->ny * p->nu * lines, sizeof *p->cross);
+  p->input = calloc(ne * p->nu * p->nu * lines, sizeof *p->input);
+  p->before = malloc(2 * ns * sizeof *p->before);
+  p->difference = calloc(ne * ns * p->all, sizeof *p->difference);
+  if (!p->count || !p->runs || !p->uneven || !p->record || !p->work || !p->line || !p->previous)
+    return false;
+  p->run = p->runs + ne;
+  p->length = p->run + ne;
+  if (!p->before) return false;
+  p->after = p->before + ns;
+  return p->mean && p->peak && p->scatter && p->cross && p->input && p->difference;
 }
 
 pb_status pb_periodic_new(const pb_periodic_options *o, size_t nu, size_t ny, pb_periodic **out,
@@ -47,6 +58,8 @@ pb_status pb_periodic_new(const pb_periodic_options *o, size_t nu, size_t ny, pb
   p->signals = nu + ny;
   p->first = first;
   p->lines = last - first + 1;
+  p->all = p->lines + 1;
+  p->gap = true;
   pb_status status =
       allocate(p) ? pb_fft_init(o->period, &p->fft, err) : pb_fail_memory(err, "periodic");
   if (status != PB_OK) {
@@ -61,14 +74,23 @@ void pb_periodic_free(pb_periodic *p) {
   if (!p) return;
   pb_fft_clear(&p->fft);
   free(p->count);
+  free(p->runs);
+  free(p->uneven);
   free(p->record);
   free(p->work);
   free(p->line);
+  free(p->previous);
   free(p->mean);
+  free(p->peak);
   free(p->scatter);
-  free(p->first_period);
-  free(p->last_period);
-  free(p->broken);
+  free(p->cross);
+  free(p->input);
+  free(p->before);
+  free(p->difference);
+  free(p->shift);
+  free(p->remainder);
+  free(p->excess);
+  free(p->moved);
   free(p);
 }
 
@@ -90,42 +112,79 @@ static void transform_period(pb_periodic *p) {
     const double *a = p->record + s * n, *b = a + n;
     for (size_t k = 0; k < n; k++) p->work[k] = CMPLX(a[k], pair ? b[k] : 0);
     pb_fft_forward(&p->fft, p->work, p->work);
-    for (size_t l = 0; l < p->lines; l++) {
-      double complex z = p->work[p->first + l], m = conj(p->work[n - p->first - l]), d = z - m;
-      p->line[s * p->lines + l] = scale * (z + m);
-      if (pair) p->line[(s + 1) * p->lines + l] = scale * CMPLX(cimag(d), -creal(d));
+    for (size_t l = 0; l < p->all; l++) {
+      size_t at = l < p->lines ? p->first + l : 0;
+      double complex z = p->work[at], m = conj(p->work[at ? n - at : 0]), d = z - m;
+      p->line[s * p->all + l] = scale * (z + m);
+      if (pair) p->line[(s + 1) * p->all + l] = scale * CMPLX(cimag(d), -creal(d));
     }
   }
 }
 
-// B. Welford's running mean and scatter (1962): no cancellation however small the scatter is.
-static void average_period(pb_periodic *p) {
-  size_t e = p->current, lines = p->lines;
-  double complex *mean = p->mean + e * p->signals * lines;
-  double count = (double)++p->count[e];
-  for (size_t s = 0; s < p->signals; s++) {
-    for (size_t l = 0; l < lines; l++) {
-      size_t k = s * lines + l;
-      double complex before = p->line[k] - mean[k];
-      mean[k] += before / count;
-      if (s < p->nu) continue;
-      double complex after = p->line[k] - mean[k];
-      size_t at = (e * p->ny + s - p->nu) * lines + l;
-      p->scatter[at] += creal(before * conj(after));
-      p->last_period[at] = p->line[k];
-      if (p->count[e] == 1) p->first_period[at] = p->line[k];
+// Sums over runs the change from one period to the next, which is that from the first to the last.
+static void follow_run(pb_periodic *p) {
+  size_t e = p->current, size = p->signals * p->all;
+  bool begins = p->gap;
+  p->gap = false;
+  if (begins) {
+    p->runs[e]++;
+    if (p->run[e] > 0) {
+      p->uneven[e] = p->uneven[e] || (p->length[e] > 0 && p->length[e] != p->run[e]);
+      p->length[e] = p->run[e];
     }
+    p->run[e] = 0;
   }
+  p->run[e]++;
+  double complex *sum = p->difference + e * size;
+  for (size_t k = 0; k < size && !begins; k++) sum[k] += p->line[k] - p->previous[k];
+  double complex *swap = p->previous;
+  p->previous = p->line;
+  p->line = swap;
+}
+
+static double complex times_conj(double complex a, double complex b) {
+  return pb_product(a, conj(b));
+}
+
+// B. Welford's running mean and scatter (1962): no cancellation however small the scatter is.
+static void average_line(pb_periodic *p, size_t e, size_t l, double count) {
+  size_t nu = p->nu, ny = p->ny, lines = p->lines;
+  for (size_t s = 0; s < p->signals; s++) {
+    double complex *mean = &p->mean[pb_periodic_series(p, e, s) * lines + l];
+    double complex value = p->line[s * p->all + l];
+    p->before[s] = value - *mean;
+    *mean += p->before[s] / count;
+    p->after[s] = value - *mean;
+  }
+  for (size_t o = 0; o < ny; o++) {
+    double complex dy = p->before[nu + o];
+    p->scatter[(e * ny + o) * lines + l] += creal(times_conj(dy, p->after[nu + o]));
+    for (size_t i = 0; i < nu; i++)
+      p->cross[((e * ny + o) * nu + i) * lines + l] += times_conj(dy, p->after[i]);
+  }
+  for (size_t i = 0; i < nu; i++) {
+    for (size_t j = 0; j < nu; j++)
+      p->input[((e * nu + i) * nu + j) * lines + l] += times_conj(p->before[i], p->after[j]);
+  }
+}
+
+static void average_period(pb_periodic *p) {
+  size_t e = p->current, n = p->options.period;
+  double count = (double)++p->count[e];
+  for (size_t l = 0; l < p->lines; l++) average_line(p, e, l, count);
+  for (size_t s = 0; s < p->signals; s++) {
+    double *peak = &p->peak[pb_periodic_series(p, e, s)];
+    for (size_t k = 0; k < n; k++) *peak = fmax(*peak, fabs(p->record[s * n + k]));
+  }
+  p->settled = false;
 }
 
 bool pb_periodic_push(pb_periodic *p, size_t experiment, const double *u, const double *y) {
   size_t n = p->options.period;
-  if (experiment >= p->options.experiments || p->settled) return false;
-  if (experiment != p->current || p->gap) {
+  if (experiment >= p->options.experiments) return false;
+  if (experiment != p->current) {
     p->current = experiment;
-    p->fill = 0;
-    p->gap = false;
-    if (p->count[experiment] > 0) p->broken[experiment] = true;  // later than right after the last
+    pb_periodic_break(p);
   }
   for (size_t i = 0; i < p->nu; i++) p->record[i * n + p->fill] = u[i];
   for (size_t o = 0; o < p->ny; o++) p->record[(p->nu + o) * n + p->fill] = y[o];
@@ -133,21 +192,29 @@ bool pb_periodic_push(pb_periodic *p, size_t experiment, const double *u, const 
   p->fill = 0;
   transform_period(p);
   average_period(p);
+  follow_run(p);
   return true;
+}
+
+double pb_periodic_rounding(const pb_periodic *p, size_t series) {
+  // Of the samples (2^-53 of the largest), of the transform, and of the plant's own state.
+  return 8 * DBL_EPSILON * p->peak[series];
+}
+
+// The mean of a signal at a line, without what pb_periodic_settle found in it.
+static double complex mean_of(const pb_periodic *p, size_t e, size_t signal, size_t l) {
+  size_t k = pb_periodic_series(p, e, signal) * p->lines + l;
+  return p->settled ? p->mean[k] - p->shift[k] : p->mean[k];
 }
 
 // W = Ū⁻¹ of line l into b [e × nu] (column i at b + i e); a is [nu × nu]. With more experiments
 // than inputs W = Ūᴴ (Ū Ūᴴ)⁻¹. Inputs are scaled to unit power, for any units.
 static bool invert_inputs(const pb_periodic *p, size_t l, double complex *a, double complex *b,
                           double *scale) {
-  size_t nu = p->nu, ne = p->options.experiments, stride = p->signals * p->lines;
-  const double complex *mean = p->mean + l;
+  size_t nu = p->nu, ne = p->options.experiments;
   for (size_t i = 0; i < nu; i++) {
     double power = 0;
-    for (size_t e = 0; e < ne; e++) {
-      double size = cabs(mean[e * stride + i * p->lines]);
-      power += size * size;
-    }
+    for (size_t e = 0; e < ne; e++) power += pow(cabs(mean_of(p, e, i, l)), 2);
     if (!(power > 0)) return false;
     scale[i] = 1 / sqrt(power);
   }
@@ -155,26 +222,64 @@ static bool invert_inputs(const pb_periodic *p, size_t l, double complex *a, dou
   for (size_t i = 0; i < nu; i++) {
     for (size_t j = 0; j < nu; j++) {
       double complex sum = 0;
-      for (size_t e = 0; e < ne; e++) {
-        sum += mean[e * stride + i * p->lines] * conj(mean[e * stride + j * p->lines]);
-      }
+      for (size_t e = 0; e < ne; e++) sum += mean_of(p, e, i, l) * conj(mean_of(p, e, j, l));
       a[i + j * nu] = sum * scale[i] * scale[j];
     }
-    for (size_t e = 0; e < ne; e++) b[i + e * nu] = mean[e * stride + i * p->lines] * scale[i];
+    for (size_t e = 0; e < ne; e++) b[i + e * nu] = mean_of(p, e, i, l) * scale[i];
   }
   return pb_small_solve(nu, ne, a, b);
 }
 
-// Coherence of output o at line l, and its σ² of the mean of each experiment into sigma2[e].
-static double scatter_of(const pb_periodic *p, size_t o, size_t l, double *sigma2) {
+// Σ_p |δY − Σ_i h_i δU_i|² over the periods of experiment e, δ the deviations from the means.
+static double residual_scatter(const pb_periodic *p, size_t e, size_t o, size_t l,
+                               const double complex *h) {
+  size_t nu = p->nu;
+  double sum = p->scatter[(e * p->ny + o) * p->lines + l];
+  for (size_t i = 0; i < nu; i++) {
+    sum -= 2 * creal(conj(h[i]) * p->cross[((e * p->ny + o) * nu + i) * p->lines + l]);
+    for (size_t j = 0; j < nu; j++)
+      sum += creal(h[i] * conj(h[j]) * p->input[((e * nu + i) * nu + j) * p->lines + l]);
+  }
+  return fmax(sum, 0);
+}
+
+// The same of one period. Where free motion was taken out that makes up more than a tenth of the
+// scatter it is that of what is left of the difference of two periods; but those between must bear
+// the motion out: by the triangle inequality they leave at least (√S − √M)² of their scatter S, M
+// that of the motion. *excess: what the taking out adds to the variance of the mean.
+static double residual_variance(const pb_periodic *p, size_t e, size_t o, size_t l,
+                                const double complex *h, double *excess) {
+  double all = residual_scatter(p, e, o, l, h), freedom = (double)p->count[e] - 1;
+  *excess = 0;
+  if (!p->settled) return all / freedom;
+  size_t at = pb_periodic_series(p, e, p->nu + o) * p->lines + l;
+  double complex left = p->remainder[at];
+  double moved = sqrt(p->moved[at]);
+  *excess = p->excess[at];
+  for (size_t i = 0; i < p->nu; i++) {
+    size_t k = pb_periodic_series(p, e, i) * p->lines + l;
+    left -= h[i] * p->remainder[k];
+    *excess += creal(h[i] * conj(h[i])) * p->excess[k];
+    moved += cabs(h[i]) * sqrt(p->moved[k]);
+  }
+  double between = pow(sqrt(all) - moved, 2) / freedom;
+  if (p->count[e] > 2 && moved * moved < 0.1 * all) return all / freedom;
+  double ends = creal(left * conj(left)) / (2 * p->freedom * (double)p->runs[e]);
+  if (p->count[e] > 2) *excess += fmax(0, between - ends);
+  return ends;
+}
+
+// Coherence of output o at line l, and its σ² of the mean of each experiment into sigma2[e]. What
+// noise adds to the power of the mean by itself is taken off: noise alone has no coherence.
+static double scatter_of(const pb_periodic *p, size_t o, size_t l, const double complex *h,
+                         double *sigma2) {
   double power = 0, noise = 0;
   for (size_t e = 0; e < p->options.experiments; e++) {
-    double count = (double)p->count[e];
-    double size = cabs(p->mean[(e * p->signals + p->nu + o) * p->lines + l]);
-    double one = p->scatter[(e * p->ny + o) * p->lines + l] / (count - 1);
-    sigma2[e] = one / count;
-    power += size * size;
-    noise += one;
+    double count = (double)p->count[e], excess, size = cabs(mean_of(p, e, p->nu + o, l));
+    double one = residual_variance(p, e, o, l, h, &excess);
+    sigma2[e] = one / count + excess;
+    power += size * size - sigma2[e];
+    noise += one + count * excess;
   }
   return power > 0 ? power / (power + noise) : 0;
 }
@@ -184,18 +289,18 @@ static void estimate_line(const pb_periodic *p, size_t l, double complex *a, dou
   size_t nu = p->nu, ne = p->options.experiments;
   bool excited = invert_inputs(p, l, a, b, scale);
   for (size_t o = 0; o < p->ny; o++) {
-    double coherence = scatter_of(p, o, l, sigma2);
+    double complex *h = frf->h + (l * p->ny + o) * nu;
+    double *variance = frf->variance + (l * p->ny + o) * nu;
+    for (size_t i = 0; excited && i < nu; i++) {
+      for (size_t e = 0; e < ne; e++)
+        h[i] += mean_of(p, e, nu + o, l) * conj(b[i + e * nu]) * scale[i];
+    }
+    double coherence = scatter_of(p, o, l, h, sigma2);
     frf->coherence[l * p->ny + o] = excited ? coherence : 0;
     for (size_t i = 0; i < nu; i++) {
-      double complex h = 0;
-      double variance = 0;
-      for (size_t e = 0; excited && e < ne; e++) {
-        double complex w = conj(b[i + e * nu]) * scale[i];
-        h += p->mean[(e * p->signals + nu + o) * p->lines + l] * w;
-        variance += creal(w * conj(w)) * sigma2[e];
-      }
-      frf->h[(l * p->ny + o) * nu + i] = h;
-      frf->variance[(l * p->ny + o) * nu + i] = excited ? variance : INFINITY;
+      if (!excited) variance[i] = INFINITY;
+      for (size_t e = 0; excited && e < ne; e++)
+        variance[i] += pow(cabs(b[i + e * nu]) * scale[i], 2) * sigma2[e];
     }
   }
 }

@@ -5,10 +5,15 @@
 // averaged:
 //   Ĥ(f) = Ȳ(f) Ū(f)⁻¹,  Ȳ [ny × e], Ū [nu × e]      (least squares when e > nu)
 // The scatter from period to period gives the noise: with W = Ū⁻¹ (e × nu), P_e periods,
-//   σ²_{o,e} = Σ_p |Y_p − Ȳ|² / ((P_e − 1) P_e),  var Ĥ_oi = Σ_e |W_ei|² σ²_{o,e}
-// (the inputs repeat exactly; where they do not, this is an upper estimate)
-// and the coherence quoted is what one period's power and scatter would give:
-//   γ²_o = Σ_e |Ȳ_oe|² / Σ_e (|Ȳ_oe|² + P_e σ²_{o,e}).
+//   V_p = (Y_p − Ȳ) − Ĥ (U_p − Ū),
+//   σ²_{o,e} = Σ_p |V_p|² / ((P_e − 1) P_e),  var Ĥ_oi = Σ_e |W_ei|² σ²_{o,e}
+// In open loop the inputs repeat exactly and V is the output's scatter. In closed loop they carry
+// the loop's answer to the noise, which is no noise of Y − H U; and because the averages Ȳ, Ū are
+// taken over periods of one command first, Ĥ is the quotient of the responses of y and of u to that
+// command (the command as instrument) and has no bias from the loop.
+// The coherence quoted is what one period's power and scatter would give, less the power that noise
+// alone gives to the mean (so that noise alone has none on average):
+//   γ²_o = S / (S + Σ_e P_e σ²_{o,e}),  S = Σ_e (|Ȳ_oe|² − σ²_{o,e}).
 // R. Pintelon, J. Schoukens, "System Identification: A Frequency Domain Approach", chapter 2.
 #ifndef PB_SIGNAL_PERIODIC_H
 #define PB_SIGNAL_PERIODIC_H
@@ -43,20 +48,30 @@ void pb_periodic_break(pb_periodic *periodic);
 size_t pb_periodic_count(const pb_periodic *periodic, size_t experiment);
 
 // Difference of the last and the first period of each experiment, as a response of `experiments`
-// inputs: h[nf][ny][experiments]. The steady state cancels in it; what is left is the decay of what
-// the start of the excitation set off, and noise. [init] PB_ERR_STATE when an experiment has fewer
-// than two periods, or periods that do not follow one another.
+// inputs: h[nf][ny][experiments], mean over runs of periods. The steady state cancels in it; what
+// is left is the decay of what the start of the excitation set off, and noise. Outputs for which it
+// is rounding have 0. [init] PB_ERR_STATE when an experiment has no two periods that follow one
+// another, or runs of such periods that are not equally long.
 pb_status pb_periodic_difference(const pb_periodic *periodic, pb_frf *out, pb_error *err);
 
-// Removes from the means what free decays at given poles explain. With a transient Σ c λᵗ over the
-// records, period p has the lines
-//   T_p(f) = Σ c λ^{pN} g(f),   g = (1 − λ^N) / (1 − λ e^{−2πi f/f_s}),   D = T_{P−1} − T_0,
-// so that c follows from D by least squares over the lines, and the means lose Σ_p T_p / P.
-// The scatter becomes that of D's remainder. pole[poles]: one of each conjugate pair (Im z > 0), or
-// real, as z. *explained is the part of D's power that the poles explain; below 0.5 nothing is
-// changed, nor where experiments have different numbers of periods. Estimates after this; pushing
-// further periods is not possible any more. [init] Fails with PB_ERR_STATE as above, PB_ERR_NUMERIC
-// (LAPACK), PB_ERR_MEMORY.
+// Finds what free motion adds to the means, to be left out by the estimates: decays at given poles,
+// and trends, which are the free motion of rigid bodies and of what is slower than the record,
+//   T(t) = Σ_k c_k λ_kᵗ + Σ_q b_q tᵠ,   q = 1 … 5,
+// over a run of P periods of N samples. Period p has the lines
+//   T_p(f) = Σ c λ^{pN} g(f) + …,   g = (1 − λ^N) / (1 − λ e^{−2πi f/f_s}),   D = T_{P−1} − T_0,
+// so that c and b follow from D by least squares over the lines and the level (f = 0), and the
+// means lose Σ_p T_p / P. A ramp has no difference at any line: it is seen at the level alone. The
+// degree is the lowest whose remainder is within four times the least. Poles within a tenth of a
+// radian of 1 over the run are left to the trends. What D leaves open widens the variance: by the
+// remainder r of D (and rounding, 8 ε of the largest sample), var ΔȲ = |r|² ‖m (MᵀM)^{-½}‖², with M
+// and m the columns of D and of the mean. Where the record is longer than two periods, and decays
+// are less than a tenth of the scatter, σ² stays that of all periods; else it is that of r.
+//
+// pole[poles]: one of each conjugate pair (Im z > 0), or real, as z. *explained is the part of D's
+// power at the lines that decays and trends explain; where it is below 0.5 with the poles, the
+// trends are found without them and it is 0. Nothing is changed where experiments have different
+// numbers of periods. Pushing a period undoes it. [init] Fails with PB_ERR_STATE as above,
+// PB_ERR_NUMERIC (LAPACK), PB_ERR_MEMORY.
 pb_status pb_periodic_settle(pb_periodic *periodic, const double complex *pole, size_t poles,
                              double *explained, pb_error *err);
 

@@ -289,13 +289,106 @@ static void test_periodic_gaps(void **state) {
   pb_periodic_free(periodic);
 }
 
+// A mass on a spring of `hz` (0: free), moved by a multisine from rest, with noise on the force and
+// on the reading; kick: a speed that it has at the start.
+typedef struct soft_mass {
+  double hz, force_noise, noise, kick;
+  uint64_t seed;
+} soft_mass;
+
+// x(k+1) = (2 − q) x(k) − x(k−1) + u(k), y = x.
+static double complex soft_exact(double hz, double line) {
+  double complex z = cexp(CMPLX(0, 2 * M_PI * line / RATE));
+  return 1 / (z - 2 * cos(2 * M_PI * hz / RATE) + 1 / z);
+}
+
+static pb_periodic *run_soft(const soft_mass *m, size_t periods) {
+  pb_multisine_spec spec = {.sample_rate = RATE, .f1 = 4, .f2 = 400, .rms = 1, .seed = 5};
+  double u[PERIOD], before = 0, x = m->kick;
+  assert_int_equal(pb_excite_multisine(&spec, PERIOD, 1, u, NULL), PB_OK);
+  pb_periodic_options options = {RATE, PERIOD, 1, 4, 400};
+  pb_periodic *periodic;
+  assert_int_equal(pb_periodic_new(&options, 1, 1, &periodic, NULL), PB_OK);
+  pb_random random;
+  pb_random_seed(&random, m->seed, 7);
+  for (size_t k = 0; k < periods * PERIOD; k++) {
+    double y = x + m->noise * pb_random_gaussian(&random);
+    pb_periodic_push(periodic, 0, &u[k % PERIOD], &y);
+    double force = u[k % PERIOD] + m->force_noise * pb_random_gaussian(&random);
+    double next = 2 * cos(2 * M_PI * m->hz / RATE) * x - before + force;
+    before = x;
+    x = next;
+  }
+  return periodic;
+}
+
+// What never dies and what outlasts the record is told from the response: the level of the periods
+// shows a ramp that their lines have alike.
+static void test_periodic_trends(void **state) {
+  (void)state;
+  static const double hz[] = {0, 0.0003, 0.001, 0.003, 0.01};
+  for (size_t k = 0; k < sizeof hz / sizeof *hz; k++) {
+    for (size_t periods = 2; periods <= 5; periods += 3) {
+      pb_periodic *periodic = run_soft(&(soft_mass){.hz = hz[k], .kick = 3}, periods);
+      double explained, worst = 0;
+      pb_frf frf;
+      assert_int_equal(pb_periodic_settle(periodic, NULL, 0, &explained, NULL), PB_OK);
+      assert_int_equal(pb_periodic_estimate(periodic, &frf, NULL), PB_OK);
+      for (size_t f = 0; f < frf.nf; f++) {
+        double complex h = soft_exact(hz[k], frf.frequency_hz[f]);
+        worst = fmax(worst, cabs(frf.h[f] / h - 1));
+      }
+      if (!(worst < 1e-6)) fail_msg("%g Hz, %zu periods: error %g", hz[k], periods, worst);
+      assert_true(frf.coherence[0] > 0.999999);
+      pb_frf_clear(&frf);
+      pb_periodic_free(periodic);
+    }
+  }
+}
+
+// What the trend leaves open is in the variance: of noise on the reading all of it, and of noise on
+// the force, which walks away with the mass, as far as few periods can tell.
+static void test_periodic_trend_noise(void **state) {
+  (void)state;
+  static const soft_mass mass[2] = {{.noise = 1, .kick = 1}, {.force_noise = 0.02, .kick = 1}};
+  static const double most[2] = {0.005, 0.1};
+  for (int kind = 0; kind < 2; kind++) {
+    double beyond = 0, chi2 = 0, all = 0;
+    for (uint64_t seed = 1; seed <= 40; seed++) {
+      soft_mass m = mass[kind];
+      m.seed = seed;
+      pb_periodic *periodic = run_soft(&m, 8);
+      double explained;
+      pb_frf frf;
+      assert_int_equal(pb_periodic_settle(periodic, NULL, 0, &explained, NULL), PB_OK);
+      assert_int_equal(pb_periodic_estimate(periodic, &frf, NULL), PB_OK);
+      for (size_t f = 0; f < frf.nf; f++, all++) {
+        double error = cabs(frf.h[f] - soft_exact(0, frf.frequency_hz[f]));
+        chi2 += error * error / frf.variance[f];
+        beyond += error * error > 9 * frf.variance[f];
+      }
+      pb_frf_clear(&frf);
+      pb_periodic_free(periodic);
+    }
+    // |e|²/s² is an F(2, 14): 7/6 in the mean, and 0.0031 of it beyond 9.
+    if (!(beyond / all < most[kind])) fail_msg("kind %d: %g beyond 3 s", kind, beyond / all);
+    if (kind == 0 && !(fabs(chi2 / all - 7.0 / 6) < 0.15)) fail_msg("|e|²/s² = %g", chi2 / all);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_windows),        cmocka_unit_test(test_welch_mimo),
-      cmocka_unit_test(test_h1_h2),          cmocka_unit_test(test_welch_gap_and_refusals),
-      cmocka_unit_test(test_unexcited),      cmocka_unit_test(test_periodic_exact),
-      cmocka_unit_test(test_periodic_noise), cmocka_unit_test(test_periodic_refusals),
+      cmocka_unit_test(test_windows),
+      cmocka_unit_test(test_welch_mimo),
+      cmocka_unit_test(test_h1_h2),
+      cmocka_unit_test(test_welch_gap_and_refusals),
+      cmocka_unit_test(test_unexcited),
+      cmocka_unit_test(test_periodic_exact),
+      cmocka_unit_test(test_periodic_noise),
+      cmocka_unit_test(test_periodic_refusals),
       cmocka_unit_test(test_periodic_gaps),
+      cmocka_unit_test(test_periodic_trends),
+      cmocka_unit_test(test_periodic_trend_noise),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
