@@ -1,6 +1,7 @@
 // See bus_qos.h. Reasons for the values:
 // - KEEP_LAST writers never block on a reader that stopped; only requests, where each one counts,
-//   are kept all, and then the client is the one that may block.
+//   are kept all, and then the client is the one that may block. The trace is kept all, too: its
+//   writer does not block but refuses, and lockstep waits with the next step.
 // - sample and command are ordered by reception: clocks of two hosts need not agree.
 // - reply and block_reply are TRANSIENT_LOCAL: an answer survives a match that is completed late.
 //   A client has one block on its way, so that one answer is kept for each.
@@ -39,6 +40,8 @@ static const topic_row table[PB_TOPIC_COUNT] = {
                                 DDS_DURABILITY_VOLATILE, 8, 0, 50, false, false},
     [PB_TOPIC_BLOCK_REPLY] = {"plantbus/v1/block_reply", &plantbus_BlockReply_desc,
                               DDS_DURABILITY_TRANSIENT_LOCAL, 1, 0, 50, false, false},
+    [PB_TOPIC_TRACE] = {"plantbus/v1/trace", &plantbus_Sample_desc, DDS_DURABILITY_VOLATILE, 0,
+                        DDS_LENGTH_UNLIMITED, 0, true, false},
 };
 
 const char *pb_topic_name(pb_topic topic) {

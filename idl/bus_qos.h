@@ -18,6 +18,7 @@ typedef enum pb_topic {
   PB_TOPIC_EVENT,
   PB_TOPIC_BLOCK_REQUEST,
   PB_TOPIC_BLOCK_REPLY,
+  PB_TOPIC_TRACE,
   PB_TOPIC_COUNT
 } pb_topic;
 
@@ -36,7 +37,7 @@ dds_entity_t pb_partition_create(dds_entity_t participant, const char *plant, bo
 
 // Writer and reader with the table's qualities of service. `lease` (seconds, 0: none) is the time
 // after which a command writer that gives no sign of life counts as dead. `depth` > 0 replaces the
-// history depth (recorders). [init]
+// history depth (recorders of a topic that keeps the last). [init]
 dds_entity_t pb_writer_create(dds_entity_t publisher, dds_entity_t topic_entity, pb_topic topic,
                               double lease);
 dds_entity_t pb_reader_create(dds_entity_t subscriber, dds_entity_t topic_entity, pb_topic topic,

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "daemon.h"
 #include "fpenv.h"
@@ -75,6 +76,19 @@ static void row_take(pb_daemon *d, const plantbus_BlockRequest *in, uint32_t r,
   memcpy(out->output._buffer + r * ny, d->current.y, ny * sizeof(double));
 }
 
+// Under lock, which is given up while recorders have no room for a sample.
+static void row_trace(pb_daemon *d) {
+  const struct timespec pause = {0, 1000000};
+  if (!pb_trace_followed(d) || d->current.step % d->engine.decimation != 0) return;
+  const plantbus_Sample sample = pb_bus_sample(d);
+  pb_trace_put(d, &sample);
+  while (pb_trace_owed(d)) {
+    pthread_mutex_unlock(&d->lock);
+    nanosleep(&pause, NULL);
+    pthread_mutex_lock(&d->lock);
+  }
+}
+
 // Under lock, which is given up for a moment now and then: the listener must not wait for a long
 // block. Nothing but this thread could begin another step or change the model meanwhile.
 static void block_run(pb_daemon *d, const plantbus_BlockRequest *in, plantbus_BlockReply *out) {
@@ -85,6 +99,7 @@ static void block_run(pb_daemon *d, const plantbus_BlockRequest *in, plantbus_Bl
       pthread_mutex_lock(&d->lock);
     }
     row_take(d, in, r, out);
+    row_trace(d);
   }
   pb_restore_denormals(saved);
 }

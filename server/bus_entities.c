@@ -24,7 +24,7 @@ static pb_status writers_create(pb_daemon *d, pb_error *err) {
     *list[i].writer = pb_writer_create(d->publisher, d->topic[t], t, 0.0);
     if (*list[i].writer < 0) return failed(err, pb_topic_name(t), *list[i].writer);
   }
-  return PB_OK;
+  return pb_trace_create(d, err);
 }
 
 // The listener is given with the creation: one set later would miss what has already arrived.

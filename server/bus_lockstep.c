@@ -7,7 +7,7 @@
 #include "daemon.h"
 #include "fpenv.h"
 
-void pb_bus_publish_sample(pb_daemon *d) {
+plantbus_Sample pb_bus_sample(const pb_daemon *d) {
   const pb_record *r = &d->current;
   plantbus_Sample s = {.step = r->step,
                        .time_ns = (int64_t)((double)r->step / d->engine.sample_rate * 1e9 + 0.5),
@@ -19,8 +19,14 @@ void pb_bus_publish_sample(pb_daemon *d) {
                        .decimation = d->engine.decimation};
   memcpy(s.input, r->u, r->nu * sizeof(double));
   memcpy(s.output, r->y, r->ny * sizeof(double));
+  return s;
+}
+
+void pb_bus_publish_sample(pb_daemon *d) {
+  const plantbus_Sample s = pb_bus_sample(d);
   dds_write(d->sample, &s);
   d->sample_written = pb_daemon_clock();
+  pb_trace_put(d, &s);
 }
 
 void pb_bus_note_faults(pb_daemon *d, const pb_record *record) {
@@ -80,11 +86,12 @@ static void step_once(pb_daemon *d) {
 }
 
 bool pb_bus_run_ready(pb_daemon *d) {
-  if (!pb_engine_ready(&d->engine)) return false;
+  if (!pb_engine_ready(&d->engine) || pb_trace_owed(d)) return false;
   const uint64_t saved = pb_flush_denormals();
-  for (int i = 0; i < PB_DAEMON_CHUNK && pb_engine_ready(&d->engine); i++) step_once(d);
+  for (int i = 0; i < PB_DAEMON_CHUNK && pb_engine_ready(&d->engine) && !pb_trace_owed(d); i++)
+    step_once(d);
   pb_restore_denormals(saved);
-  return pb_engine_ready(&d->engine);
+  return pb_engine_ready(&d->engine) && !d->trace.owed;
 }
 
 // The first command of a session from this writer: is it the client that attached?

@@ -20,14 +20,14 @@ static bool lockstep_tend(pb_daemon *d) {
 static dds_duration_t tend(pb_daemon *d) {
   pthread_mutex_lock(&d->lock);
   const bool more = lockstep_tend(d);
-  const bool waiting = pb_engine_waiting(&d->engine);
+  const bool waiting = pb_engine_waiting(&d->engine), owed = pb_trace_owed(d);
   pthread_mutex_unlock(&d->lock);
   pb_bus_realtime_tend(d);
   pb_configure_tend(d);
   if (d->description_due) pb_bus_publish_description(d);  // before the event that tells of it
   pb_bus_publish_events(d);
   if (d->status_due || pb_daemon_clock() - d->status_written >= status_ns) pb_bus_publish_status(d);
-  return more ? 0 : waiting ? DDS_MSECS(5) : DDS_MSECS(20);
+  return more ? 0 : owed ? DDS_MSECS(1) : waiting ? DDS_MSECS(5) : DDS_MSECS(20);
 }
 
 void *pb_bus_service(void *context) {

@@ -59,6 +59,17 @@ typedef struct pb_answered {
 
 struct pb_request;
 
+// What recorders are owed. Under lock, but for the number of them.
+typedef struct pb_trace {
+  dds_entity_t writer;
+  atomic_uint followers;
+  plantbus_Sample sample;  // offered last
+  bool owed;               // there was no room for it
+  int64_t since;           // … at that time
+  bool cut;                // it was waited for in vain: samples are lost on recorders
+  uint64_t lost;           // so many since
+} pb_trace;
+
 typedef struct pb_daemon {
   pb_daemon_options options;  // never changes
   char *name;                 // of the plant, and of its partition; never changes
@@ -80,7 +91,8 @@ typedef struct pb_daemon {
   pb_histogram step_time;  // under lock: of steps that are not taken in real time
   pb_record current;       // under lock: what was published last
   int64_t sample_written;  // under lock: wall clock, for republishing
-  uint32_t faults;         // under lock: sticky flags of this epoch
+  pb_trace trace;
+  uint32_t faults;  // under lock: sticky flags of this epoch
   uint64_t fault_step[PB_FLAG_COUNT];
   bool input_owed;  // under lock: the ring to the step thread was full
   bool listening;   // under lock: the daemon is complete
@@ -164,11 +176,29 @@ void pb_bus_change_made(pb_daemon *daemon);
 // Takes one step with these values (NULL: none) beside the channels; publishes nothing.
 void pb_bus_step(pb_daemon *daemon, const double *beside);
 
+// The current record as the bus has it.
+plantbus_Sample pb_bus_sample(const pb_daemon *daemon);
+
 // Publishes the current record (again).
 void pb_bus_publish_sample(pb_daemon *daemon);
 
 // Keeps the sticky faults; the first of each is told.
 void pb_bus_note_faults(pb_daemon *daemon, const pb_record *record);
+
+// --- bus_trace.c, under lock ---
+
+// The writer. [init]
+pb_status pb_trace_create(pb_daemon *daemon, pb_error *err);
+
+// True when somebody reads the trace.
+bool pb_trace_followed(const pb_daemon *daemon);
+
+// Offers a published sample. What there is no room for is owed in lockstep, and lost in real time.
+void pb_trace_put(pb_daemon *daemon, const plantbus_Sample *sample);
+
+// True while the sample offered last is owed and waited for: no further step may be taken. Tries
+// again.
+bool pb_trace_owed(pb_daemon *daemon);
 
 // --- bus_realtime.c, called by the service thread without the lock ---
 pb_status pb_bus_realtime_start(pb_daemon *daemon, pb_error *err);

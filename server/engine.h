@@ -75,6 +75,7 @@ typedef enum pb_verdict {
   X(CONFIGURE_FAILED, "configure_failed") /* of a request that was accepted */                     \
   X(HOSTED, "hosted")                     /* a controller or an excitation runs inside the step */ \
   X(UNHOSTED, "unhosted")                 /* … was removed, or has come to its end */            \
+  X(UNRECORDED, "unrecorded")             /* samples are lost on recorders, or no longer */        \
   X(OVERRUN, "overrun")                   /* real time was given up: overrun policy "stop" */      \
   X(SHUTDOWN, "shutdown")
 

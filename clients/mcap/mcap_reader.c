@@ -7,6 +7,8 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "mcap_compress.h"
+
 typedef struct reader {
   const char *path;
   const pb_mcap_visitor *visitor;
@@ -18,11 +20,14 @@ typedef struct reader {
   bool ended;         // the end of the file's proper form is there: what is cut short is damaged
   uint64_t summary;   // where it begins; 0: still in the data section
   bool done;
+  bool is_damaged;  // why a record could not be read
   uint8_t head[PB_MCAP_HEAD_SIZE];
   pb_bytes content;
+  pb_bytes records;  // of a compressed chunk
 } reader;
 
-static pb_status damaged(const reader *r, const char *what, pb_error *err) {
+static pb_status damaged(reader *r, const char *what, pb_error *err) {
+  r->is_damaged = true;
   return pb_fail(err, PB_ERR_SYNTAX, r->path, "is damaged: %s (record at byte %llu)", what,
                  (unsigned long long)r->at);
 }
@@ -102,30 +107,79 @@ static pb_status inner_read(reader *r, uint8_t opcode, pb_cursor c, pb_error *er
   }
 }
 
+// *records: compressed on entry. A size that no recorder makes is damage, not a reason to take
+// memory.
+static pb_status chunk_expand(reader *r, pb_view compression, uint64_t size, pb_view *records,
+                              pb_error *err) {
+  const pb_mcap_compression kind = pb_mcap_compression_of(compression);
+  bool whole;
+  if (kind == PB_MCAP_NONE) return PB_OK;
+  if (kind == PB_MCAP_COMPRESSIONS)
+    return pb_fail(err, PB_ERR_SYNTAX, r->path,
+                   "has chunks compressed with '%.*s'; known are lz4 and zstd",
+                   compression.size > 16 ? 16 : (int)compression.size, (const char *)compression.p);
+  r->records.size = 0;
+  pb_status status = pb_mcap_expand(
+      kind, *records, size < SIZE_MAX / 2 ? (size_t)size : SIZE_MAX / 2, &r->records, &whole, err);
+  *records = (pb_view){r->records.p, r->records.size};
+  return status || whole ? status : damaged(r, "a compressed chunk", err);
+}
+
+// What a chunk holds. cut: it may break off within a record.
+static pb_status records_hand_out(reader *r, pb_view records, bool cut, pb_error *err) {
+  pb_cursor inner = {records.p, records.size, false};
+  while (inner.left > 0) {
+    const uint8_t opcode = pb_cursor_u8(&inner);
+    const pb_view content = pb_cursor_take(&inner, pb_cursor_u64(&inner));
+    if (inner.bad) return cut ? PB_OK : damaged(r, "a record in a chunk", err);
+    const pb_status status =
+        inner_read(r, opcode, (pb_cursor){content.p, content.size, false}, err);
+    if (status) return status;
+  }
+  return PB_OK;
+}
+
 static pb_status chunk_read(reader *r, pb_cursor c, pb_error *err) {
   pb_cursor_u64(&c);
   pb_cursor_u64(&c);
   const uint64_t size = pb_cursor_u64(&c);
   const uint32_t crc = pb_cursor_u32(&c);
   const pb_view compression = pb_cursor_text(&c);
-  const pb_view records = pb_cursor_take(&c, pb_cursor_u64(&c));
+  pb_view records = pb_cursor_take(&c, pb_cursor_u64(&c));
   if (c.bad) return damaged(r, "a chunk", err);
-  if (compression.size > 0)
-    return pb_fail(err, PB_ERR_SYNTAX, r->path, "has chunks compressed with '%.*s': not supported",
-                   compression.size > 16 ? 16 : (int)compression.size, (const char *)compression.p);
+  pb_status status = chunk_expand(r, compression, size, &records, err);
+  if (status) return status;
   if (records.size != size || (crc != 0 && crc != pb_crc32(0, records.p, records.size)))
     return damaged(r, "the CRC of a chunk does not match", err);
   r->report->chunks++;
-  pb_cursor inner = {records.p, records.size, false};
-  while (inner.left > 0) {
-    const uint8_t opcode = pb_cursor_u8(&inner);
-    const pb_view content = pb_cursor_take(&inner, pb_cursor_u64(&inner));
-    if (inner.bad) return damaged(r, "a record in a chunk", err);
-    const pb_status status =
-        inner_read(r, opcode, (pb_cursor){content.p, content.size, false}, err);
+  return records_hand_out(r, records, false, err);
+}
+
+// A chunk that the end of the file cuts: `have` octets of it are there.
+static pb_status chunk_salvage(reader *r, size_t have, pb_error *err) {
+  pb_cursor c = {r->content.p, have, false};
+  pb_cursor_u64(&c);
+  pb_cursor_u64(&c);
+  const uint64_t size = pb_cursor_u64(&c);
+  pb_cursor_u32(&c);
+  const pb_view compression = pb_cursor_text(&c);
+  pb_cursor_u64(&c);
+  if (c.bad) return PB_OK;
+  pb_view records = {c.p, c.left};
+  const pb_mcap_compression kind = pb_mcap_compression_of(compression);
+  if (kind == PB_MCAP_COMPRESSIONS) return PB_OK;
+  if (kind != PB_MCAP_NONE) {
+    bool whole;
+    r->records.size = 0;
+    const pb_status status = pb_mcap_expand(
+        kind, records, size < SIZE_MAX / 2 ? (size_t)size : SIZE_MAX / 2, &r->records, &whole, err);
     if (status) return status;
+    records = (pb_view){r->records.p, r->records.size};
   }
-  return PB_OK;
+  const uint64_t before = r->report->messages;
+  const pb_status status = records_hand_out(r, records, true, err);
+  r->report->salvaged += r->report->messages - before;
+  return status;
 }
 
 // ---- the end ------------------------------------------------------------------------------------
@@ -181,33 +235,46 @@ static pb_status record_read(reader *r, pb_error *err) {
 
 // ---- the file -----------------------------------------------------------------------------------
 
-// *whole false: the file ends before the record does.
-static pb_status record_fetch(reader *r, bool *whole, pb_error *err) {
+// *whole false: the file ends before the record does; *have octets of its content are there.
+static pb_status record_fetch(reader *r, bool *whole, size_t *have, pb_error *err) {
   *whole = false;
+  *have = 0;
   r->content.size = 0;
   if (r->size - r->at < sizeof r->head) return PB_OK;
   if (fread(r->head, 1, sizeof r->head, r->stream) != sizeof r->head)
     return pb_fail(err, PB_ERR_IO, r->path, "cannot be read");
   pb_cursor c = {r->head + 1, 8, false};
-  const uint64_t size = pb_cursor_u64(&c);
-  if (size > r->size - r->at - sizeof r->head) return PB_OK;
-  uint8_t *at = pb_bytes_grow(&r->content, (size_t)size);
+  const uint64_t size = pb_cursor_u64(&c), left = r->size - r->at - sizeof r->head;
+  *whole = size <= left;
+  if (!*whole && !r->visitor->salvage) return PB_OK;
+  *have = (size_t)(*whole ? size : left);
+  uint8_t *at = pb_bytes_grow(&r->content, *have);
   if (!at) return pb_fail_memory(err, r->path);
-  if (fread(at, 1, (size_t)size, r->stream) != size)
+  if (fread(at, 1, *have, r->stream) != *have)
     return pb_fail(err, PB_ERR_IO, r->path, "cannot be read");
-  *whole = true;
+  return PB_OK;
+}
+
+// What cannot be read of it is left out, where that is wanted.
+static pb_status record_salvage(reader *r, pb_status status) {
+  if (!r->visitor->salvage || !r->is_damaged || status != PB_ERR_SYNTAX || !r->begun) return status;
+  r->is_damaged = false;
+  r->report->damaged++;
   return PB_OK;
 }
 
 static pb_status records_read(reader *r, pb_error *err) {
   while (!r->done) {
     bool whole;
-    pb_status status = record_fetch(r, &whole, err);
+    size_t have;
+    pb_status status = record_fetch(r, &whole, &have, err);
+    if (!status && !whole && r->begun && r->visitor->salvage)
+      return r->head[0] == PB_MCAP_CHUNK && r->summary == 0 ? chunk_salvage(r, have, err) : PB_OK;
     if (!status && !whole && r->ended) status = damaged(r, "a record has the wrong length", err);
     if (!status && !whole && !r->begun) status = damaged(r, "it holds nothing", err);
     if (!status && !whole) return PB_OK;
     const bool end = r->head[0] == PB_MCAP_DATA_END && r->summary == 0;
-    if (!status) status = record_read(r, err);
+    if (!status) status = record_salvage(r, record_read(r, err));
     if (status) return status;
     r->crc = pb_crc32(pb_crc32(end ? 0 : r->crc, r->head, end ? 0 : sizeof r->head), r->content.p,
                       end ? 0 : r->content.size);
@@ -247,5 +314,6 @@ pb_status pb_mcap_read(const char *path, const pb_mcap_visitor *visitor, pb_mcap
   if (!status) status = records_read(&r, err);
   fclose(r.stream);
   pb_bytes_free(&r.content);
+  pb_bytes_free(&r.records);
   return status;
 }

@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "mcap_writer_internal.h"
 
@@ -48,7 +49,7 @@ static pb_status put_record(pb_mcap_writer *w, pb_error *err) {
 
 // ---- begin --------------------------------------------------------------------------------------
 
-pb_status pb_mcap_writer_create(const char *path, const char *profile, const char *library,
+pb_status pb_mcap_writer_create(const char *path, const pb_mcap_writer_options *options,
                                 pb_mcap_writer **out, pb_error *err) {
   *out = NULL;
   pb_mcap_writer *w = calloc(1, sizeof *w);
@@ -56,14 +57,15 @@ pb_status pb_mcap_writer_create(const char *path, const char *profile, const cha
     free(w);
     return pb_fail_memory(err, path);
   }
-  w->stream = fopen(path, "wb");
+  w->compression = options->compression;
+  w->stream = fopen(path, options->exclusive ? "wbx" : "wb");
   pb_status status = PB_OK;
   if (!w->stream) status = pb_fail(err, PB_ERR_IO, path, "cannot be created: %s", strerror(errno));
   if (!status) {
     pb_bytes_raw(&w->record, PB_MCAP_MAGIC, PB_MCAP_MAGIC_SIZE);
     const size_t begin = pb_mcap_record_begin(&w->record, PB_MCAP_HEADER);
-    pb_bytes_text(&w->record, profile);
-    pb_bytes_text(&w->record, library);
+    pb_bytes_text(&w->record, options->profile ? options->profile : "");
+    pb_bytes_text(&w->record, options->library ? options->library : "");
     pb_mcap_record_end(&w->record, begin);
     status = put_record(w, err);
   }
@@ -81,6 +83,7 @@ void pb_mcap_writer_discard(pb_mcap_writer *w) {
   for (int i = 0; i < PB_MCAP_GROUPS; i++) pb_bytes_free(&w->group[i]);
   for (int i = 0; i < PB_MCAP_CHANNELS; i++) pb_bytes_free(&w->channel[i].index);
   pb_bytes_free(&w->chunk);
+  pb_bytes_free(&w->packed);
   pb_bytes_free(&w->record);
   free(w->path);
   free(w);
@@ -167,6 +170,14 @@ pb_status pb_mcap_writer_flush(pb_mcap_writer *w, pb_error *err) {
   const pb_status status = pb_mcap_chunk_end(w, err);
   if (!status && fflush(w->stream))
     return pb_fail(err, PB_ERR_IO, w->path, "cannot be written: %s", strerror(errno));
+  return status;
+}
+
+pb_status pb_mcap_writer_sync(pb_mcap_writer *w, pb_error *err) {
+  const pb_status status = pb_mcap_writer_flush(w, err);
+  // A pipe or a device has no disk to wait for.
+  if (!status && fsync(fileno(w->stream)) != 0 && errno != EINVAL && errno != EROFS)
+    return pb_fail(err, PB_ERR_IO, w->path, "cannot be brought to the disk: %s", strerror(errno));
   return status;
 }
 

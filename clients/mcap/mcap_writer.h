@@ -1,21 +1,28 @@
 // Writes an MCAP file as it comes: what has been flushed is on its way to the disk as whole
 // records, so that a file that never got its end is readable up to there.
 //
-// Chunks are not compressed and carry CRCs, and so do attachments, data section and summary.
+// Chunks carry CRCs, and so do attachments, data section and summary.
 // Every failure leaves a writer that can only be discarded.
 #ifndef PB_CLIENTS_MCAP_WRITER_H
 #define PB_CLIENTS_MCAP_WRITER_H
 
 #include "base/status.h"
 #include "mcap.h"
+#include "mcap_compress.h"
 
 typedef struct pb_mcap_writer pb_mcap_writer;
 
 enum { PB_MCAP_CHUNK_BYTES = 1 << 20, PB_MCAP_CHANNELS = 64 };
 
-// Creates the file (an existing one is replaced). profile may be "". *out is released by
-// pb_mcap_writer_close or pb_mcap_writer_discard. Fails with PB_ERR_IO, PB_ERR_MEMORY.
-pb_status pb_mcap_writer_create(const char *path, const char *profile, const char *library,
+typedef struct pb_mcap_writer_options {
+  const char *profile, *library;    // NULL: ""
+  pb_mcap_compression compression;  // of chunks
+  bool exclusive;                   // an existing file is not replaced: PB_ERR_IO
+} pb_mcap_writer_options;
+
+// Creates the file. *out is released by pb_mcap_writer_close or pb_mcap_writer_discard. Fails with
+// PB_ERR_IO, PB_ERR_MEMORY.
+pb_status pb_mcap_writer_create(const char *path, const pb_mcap_writer_options *options,
                                 pb_mcap_writer **out, pb_error *err);
 
 // A schema, and a channel of messages that refers to it (0: none); *id counts from 1. At most
@@ -43,6 +50,9 @@ pb_status pb_mcap_writer_metadata(pb_mcap_writer *w, const char *name, const pb_
 
 // Ends the present chunk and hands everything to the operating system.
 pb_status pb_mcap_writer_flush(pb_mcap_writer *w, pb_error *err);
+
+// … and waits until the disk has it.
+pb_status pb_mcap_writer_sync(pb_mcap_writer *w, pb_error *err);
 
 // Octets written so far, and those of the chunk that is being filled. [any]
 uint64_t pb_mcap_writer_bytes(const pb_mcap_writer *w);

@@ -8,19 +8,27 @@
 
 static pb_status chunk_put(pb_mcap_writer *w, pb_error *err) {
   pb_bytes *b = &w->record;
+  pb_view records = {w->chunk.p, w->chunk.size};
+  if (w->compression != PB_MCAP_NONE) {
+    w->packed.size = 0;
+    const pb_status status = pb_mcap_compress(w->compression, records, &w->packed, err);
+    if (status) return status;
+    records = (pb_view){w->packed.p, w->packed.size};
+  }
+  w->packed_size = records.size;
   const size_t begin = pb_mcap_record_begin(b, PB_MCAP_CHUNK);
   pb_bytes_u64(b, w->chunk_first);
   pb_bytes_u64(b, w->chunk_last);
   pb_bytes_u64(b, w->chunk.size);
   pb_bytes_u32(b, pb_crc32(0, w->chunk.p, w->chunk.size));
-  pb_bytes_text(b, "");
-  pb_bytes_u64(b, w->chunk.size);
-  // The records follow from the chunk's own buffer.
-  pb_bytes_set_u64(b, begin - 8, b->size - begin + w->chunk.size);
+  pb_bytes_text(b, pb_mcap_compression_name(w->compression));
+  pb_bytes_u64(b, records.size);
+  // The records follow from their own buffer.
+  pb_bytes_set_u64(b, begin - 8, b->size - begin + records.size);
   if (b->failed) return pb_fail_memory(err, w->path);
   pb_status status = pb_mcap_put(w, b->p, b->size, err);
   b->size = 0;
-  return status ? status : pb_mcap_put(w, w->chunk.p, w->chunk.size, err);
+  return status ? status : pb_mcap_put(w, records.p, records.size, err);
 }
 
 // Message Index records; where each begins goes into the chunk's index.
@@ -62,8 +70,8 @@ pb_status pb_mcap_chunk_end(pb_mcap_writer *w, pb_error *err) {
   status = indexes_put(w, index, err);
   pb_bytes_set_u32(index, map - 4, (uint32_t)(index->size - map));
   pb_bytes_u64(index, w->offset - after);
-  pb_bytes_text(index, "");
-  pb_bytes_u64(index, w->chunk.size);
+  pb_bytes_text(index, pb_mcap_compression_name(w->compression));
+  pb_bytes_u64(index, w->packed_size);
   pb_bytes_u64(index, w->chunk.size);
   pb_mcap_record_end(index, begin);
   w->chunk.size = 0;

@@ -25,9 +25,12 @@ struct pb_mcap_channel {
 struct pb_mcap_writer {
   char *path;
   FILE *stream;
+  pb_mcap_compression compression;
   uint64_t offset;                                   // octets written
   uint32_t crc;                                      // of all of them
   pb_bytes record;                                   // being put together
+  pb_bytes packed;                                   // the compressed chunk
+  uint64_t packed_size;                              // … or that of one that is not
   pb_bytes chunk;                                    // the records of the present chunk
   uint64_t chunk_messages, chunk_first, chunk_last;  // … and the log times of its messages
   uint64_t messages, first, last;                    // of the file

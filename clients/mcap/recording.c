@@ -19,6 +19,7 @@ typedef struct opening {
   pb_recorded_sample call;  // the second reading: samples only
   void *call_context;
   pb_spans spans;
+  bool told;  // by the summary: the epochs
 } opening;
 
 static pb_status not_ours(const pb_recording *r, const char *what, pb_error *err) {
@@ -125,27 +126,88 @@ static pb_status on_attachment(void *context, const pb_mcap_attachment *a, pb_er
 
 // ---- the whole ----------------------------------------------------------------------------------
 
-pb_status pb_recording_open(const char *path, pb_recording **out, pb_error *err) {
-  *out = NULL;
-  opening *o = calloc(1, sizeof *o);
+static pb_status opening_new(const char *path, opening **out, pb_error *err) {
+  opening *o = *out = calloc(1, sizeof *o);
   pb_recording *r = calloc(1, sizeof *r);
-  if (o) o->recording = r;
   if (r) r->path = strdup(path);
-  pb_status status = o && r && r->path ? PB_OK : pb_fail_memory(err, path);
+  if (o) o->recording = r;
+  if (o && r && r->path) return PB_OK;
+  if (r) free(r->path);
+  free(r);
+  free(o);
+  *out = NULL;
+  return pb_fail_memory(err, path);
+}
+
+static pb_status opening_end(opening *o, pb_status status, pb_recording **out, pb_error *err) {
+  pb_recording *r = o->recording;
+  if (!status && r->revisions == 0) status = not_ours(r, "it describes none", err);
+  free(o);
+  if (status)
+    pb_recording_free(r);
+  else
+    *out = r;
+  return status;
+}
+
+pb_status pb_recording_open(const char *path, pb_recording **out, pb_error *err) {
+  opening *o;
+  *out = NULL;
+  pb_status status = opening_new(path, &o, err);
+  if (status) return status;
   const pb_mcap_visitor visitor = {.context = o,
                                    .channel = on_channel,
                                    .message = on_message,
                                    .attachment = on_attachment,
                                    .metadata = on_metadata};
-  if (!status) status = pb_mcap_read(path, &visitor, &r->file, err);
-  if (!status && r->revisions == 0) status = not_ours(r, "it describes none", err);
-  free(o);
-  if (status) {
-    pb_recording_free(r);
-    return status;
+  status = pb_mcap_read(path, &visitor, &o->recording->file, err);
+  return opening_end(o, status, out, err);
+}
+
+// ---- by the summary -----------------------------------------------------------------------------
+
+static pb_status on_indexed_metadata(void *context, const pb_mcap_metadata *m, pb_error *err) {
+  opening *o = context;
+  if (!pb_view_is(m->name, PB_RECORDING_END)) return on_metadata(context, m, err);
+  return pb_recording_end_read(m->pairs, &o->recording->spans, &o->told, err);
+}
+
+static pb_status on_indexed_event(void *context, const pb_mcap_message *m, pb_error *err) {
+  return event_add(((opening *)context)->recording, m, err);
+}
+
+static void counts_take(pb_recording *r, const pb_mcap_summary *s) {
+  for (size_t i = 0; i < s->channels; i++) {
+    if (!strcmp(s->channel[i].topic, pb_topic_name(PB_TOPIC_STATUS)))
+      r->statuses += s->channel[i].messages;
+    if (!strcmp(s->channel[i].topic, pb_topic_name(PB_TOPIC_COMMAND)))
+      r->commands += s->channel[i].messages;
   }
-  *out = r;
-  return PB_OK;
+  r->file = (pb_mcap_report){.complete = true, .bytes = s->bytes, .read_to = s->bytes};
+  r->log_first = s->first;
+  r->log_last = s->last;
+}
+
+pb_status pb_recording_open_index(const char *path, pb_recording **out, pb_error *err) {
+  opening *o;
+  pb_mcap_summary summary;
+  bool found = false;
+  *out = NULL;
+  pb_status status = opening_new(path, &o, err);
+  if (status) return status;
+  const pb_mcap_visitor visitor = {.context = o,
+                                   .message = on_indexed_event,
+                                   .attachment = on_attachment,
+                                   .metadata = on_indexed_metadata};
+  status = pb_mcap_read_index(path, &visitor, pb_topic_name(PB_TOPIC_EVENT), &summary, &found, err);
+  if (!status && found && o->told) {
+    counts_take(o->recording, &summary);
+    return opening_end(o, status, out, err);
+  }
+  // Whatever is the matter is found where all is read.
+  pb_recording_free(o->recording);
+  free(o);
+  return pb_recording_open(path, out, err);
 }
 
 pb_status pb_recording_samples(const pb_recording *recording, pb_recorded_sample call,

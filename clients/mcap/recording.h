@@ -4,6 +4,7 @@
 #define PB_CLIENTS_RECORDING_H
 
 #include "mcap_reader.h"
+#include "mcap_writer.h"
 #include "spans.h"
 
 // Names of the metadata records, and the keys of the first.
@@ -50,7 +51,18 @@ typedef struct pb_recording {
 // Fails with PB_ERR_IO, PB_ERR_SYNTAX (damaged, not a recording of a plant), PB_ERR_MEMORY. *out is
 // owned by the caller (pb_recording_free).
 pb_status pb_recording_open(const char *path, pb_recording **out, pb_error *err);
+
+// The same by the summary at the end of the file: epochs, revisions, plant files and events, as
+// they were told there; samples are neither read nor checked. A file without such a summary is read
+// as a whole. [init]
+pb_status pb_recording_open_index(const char *path, pb_recording **out, pb_error *err);
 void pb_recording_free(pb_recording *recording);
+
+// The metadata record at the end of a recording, written and read: *found: it tells the epochs,
+// which *out (zeroed) then holds. PB_ERR_IO, PB_ERR_MEMORY, PB_ERR_SYNTAX. [init]
+pb_status pb_recording_end_write(pb_mcap_writer *writer, const pb_spans *spans, const char *plant,
+                                 uint32_t part, const char *ended_by, pb_error *err);
+pb_status pb_recording_end_read(pb_view pairs, pb_spans *out, bool *found, pb_error *err);
 
 // The sample rate of the last revision, Hz; 0 without any. [any]
 double pb_recording_rate(const pb_recording *recording);

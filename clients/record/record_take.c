@@ -8,21 +8,48 @@
 
 enum { BATCH = 256 };
 
-uint64_t record_wall_clock(void) {
-  struct timespec t;
-  clock_gettime(CLOCK_REALTIME, &t);
-  return (uint64_t)t.tv_sec * 1000000000u + (uint64_t)t.tv_nsec;
-}
-
-static int64_t clock_now(void) {
+int64_t record_clock(void) {
   struct timespec t;
   clock_gettime(CLOCK_MONOTONIC, &t);
   return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
 }
 
+uint64_t record_wall_clock(const recorder *r) {
+  return (uint64_t)(record_clock() + r->wall_offset);
+}
+
+// When a message was written, on the recorder's clock: by the clock of its writer, as long as that
+// goes on as it began; one that is set, or that of another host, is brought to the recorder's.
+static uint64_t log_time(recorder *r, int64_t source) {
+  static const int64_t most = 1000000000;  // that a message may be under way, ns
+  const int64_t now = (int64_t)record_wall_clock(r);
+  if (source <= 0) return (uint64_t)now;
+  const int64_t late = now - (source + r->source_offset);
+  if (late > most || late < -most / 10) r->source_offset = now - source;
+  return (uint64_t)(source + r->source_offset);
+}
+
+bool record_participant(dds_entity_t reader, dds_instance_handle_t writer, dds_guid_t *out) {
+  dds_builtintopic_endpoint_t *e = dds_get_matched_publication_data(reader, writer);
+  if (!e) return false;
+  *out = e->participant_key;
+  dds_builtintopic_free_endpoint(e);
+  return true;
+}
+
+// Another daemon of the plant's name may be there. Commands are their clients'.
+static bool foreign(const recorder *r, record_topic *t, dds_instance_handle_t writer) {
+  dds_guid_t participant;
+  if (t->bit == RECORD_COMMAND || t->writer == writer) return false;
+  if (!record_participant(t->reader, writer, &participant)) return false;  // it has ended since
+  if (memcmp(&participant, &r->daemon, sizeof participant) != 0) return true;
+  t->writer = writer;
+  return false;
+}
+
 static bool described(const recorder *r, uint32_t revision) {
-  for (size_t i = r->revisions; i > 0; i--)
-    if (r->revision[i - 1] == revision) return true;
+  for (size_t i = r->part.revisions; i > 0; i--)
+    if (r->part.revision[i - 1] == revision) return true;
   return false;
 }
 
@@ -51,9 +78,12 @@ static pb_status sample_look(recorder *r, pb_view data, int64_t *plant_ns, bool 
   if (!pb_cdr_sample(data, &x))
     return pb_fail(err, PB_ERR_SYNTAX, r->report->plant, "a sample is not as this program expects");
   pb_status status = pb_spans_add(&r->report->spans, &x, keep, err);
+  if (!status && *keep && record_part_full(r)) status = record_part_next(r, err);
+  bool also;
+  if (!status && *keep) status = pb_spans_add(&r->part.spans, &x, &also, err);
   if (status || !*keep) return status;
   *plant_ns = r->plant_ns = x.time_ns;
-  r->last_arrival = clock_now();
+  r->last_arrival = record_clock();
   if (r->report->spans.samples == 1) r->first_arrival = r->last_arrival;
   if (!described(r, x.revision)) r->report->undescribed++;
   r->done = limit_reached(r);
@@ -92,11 +122,9 @@ static pb_status message_write(recorder *r, record_topic *t, const pb_bytes *dat
   pb_status status = message_look(r, t, (pb_view){data->p, data->size}, &plant_ns, &keep, err);
   if (status || !keep) return status;
   const pb_mcap_stamp stamp = {.sequence = t->sequence++,
-                               .log_time = info->source_timestamp > 0
-                                               ? (uint64_t)info->source_timestamp
-                                               : record_wall_clock(),
+                               .log_time = log_time(r, info->source_timestamp),
                                .publish_time = plant_ns > 0 ? (uint64_t)plant_ns : 0};
-  uint8_t *at = pb_mcap_writer_message(r->writer, t->channel, stamp, data->size, err);
+  uint8_t *at = pb_mcap_writer_message(r->part.writer, t->channel, stamp, data->size, err);
   if (!at) return err->code;
   memcpy(at, data->p, data->size);
   return PB_OK;
@@ -110,6 +138,10 @@ static pb_status batch_write(recorder *r, record_topic *t, struct ddsi_serdata *
   pb_bytes data = {0};
   for (int i = 0; i < count && !status; i++) {
     if (!info[i].valid_data) continue;
+    if (foreign(r, t, info[i].publication_handle)) {
+      r->report->foreign++;
+      continue;
+    }
     const uint32_t size = ddsi_serdata_size(serial[i]);
     data.size = 0;
     uint8_t *at = pb_bytes_grow(&data, size);

@@ -12,11 +12,15 @@ typedef struct replay_options {
   bool json;
   pb_export_choice choice;
   pb_name_list signals;
-  const char *csv, *mat, *plant_out;
+  const char *csv, *mat, *plant_out, *out;
+  bool check;        // info: read all of it
   double tolerance;  // < 0: only report
 } replay_options;
 
 pb_status command_info(const replay_options *options, const pb_recording *recording, pb_error *err);
+// *path into a complete file *out. PB_ERR_IO: it is there already, or cannot be written;
+// PB_ERR_SYNTAX: nothing of it can be read.
+pb_status command_repair(const replay_options *options, pb_error *err);
 pb_status command_export(const replay_options *options, const pb_recording *recording,
                          pb_error *err);
 pb_status command_play(const replay_options *options, const pb_recording *recording, pb_error *err);
@@ -33,8 +37,9 @@ typedef struct replay_run {
   double *y;  // [steps][ny]
 } replay_run;
 
-// The epoch of that number, or the first (0). Fails with PB_ERR_STATE when it does not begin at
-// step 0, has gaps, was decimated, or changes its revision. [init]
+// The epoch of that number, or the first whole one (0; told on stderr where there are several).
+// Fails with PB_ERR_STATE when it does not begin at step 0, has gaps, was decimated, or changes its
+// revision. [init]
 pb_status replay_load(const pb_recording *recording, uint32_t epoch, replay_run *out,
                       pb_error *err);
 void replay_free(replay_run *run);

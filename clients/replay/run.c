@@ -1,4 +1,5 @@
 // One epoch of a recording, loaded to be run again, and how far a second run is from it.
+#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -6,12 +7,6 @@
 #include "jsonout.h"
 #include "replay.h"
 #include "table.h"
-
-static const pb_span *span_find(const pb_recording *r, uint32_t epoch) {
-  for (size_t i = 0; i < r->spans.count; i++)
-    if (epoch == 0 || r->spans.span[i].epoch == epoch) return &r->spans.span[i];
-  return NULL;
-}
 
 static pb_status span_check(const pb_span *s, uint32_t epoch, pb_error *err) {
   char name[32];
@@ -31,6 +26,23 @@ static pb_status span_check(const pb_span *s, uint32_t epoch, pb_error *err) {
   return PB_OK;
 }
 
+// Of that number; 0: the first that is whole, or the first where none is.
+static const pb_span *span_find(const pb_recording *r, uint32_t epoch) {
+  pb_error ignored;
+  for (size_t i = 0; i < r->spans.count; i++) {
+    const pb_span *s = &r->spans.span[i];
+    if (epoch == 0 ? !span_check(s, epoch, &ignored) : s->epoch == epoch) return s;
+  }
+  return epoch == 0 && r->spans.count > 0 ? &r->spans.span[0] : NULL;
+}
+
+// Which one was taken, when that was not said.
+static void tell_choice(const pb_recording *r, const pb_span *s) {
+  if (r->spans.count < 2) return;
+  fprintf(stderr, "%s: epoch %u of the %zu recorded, the first that is whole\n",
+          program_invocation_short_name, s->epoch, r->spans.count);
+}
+
 static pb_status sample_load(void *context, const plantbus_Sample *x, pb_error *err) {
   replay_run *run = context;
   if (x->epoch != run->epoch) return PB_OK;
@@ -47,6 +59,7 @@ pb_status replay_load(const pb_recording *r, uint32_t epoch, replay_run *out, pb
   const pb_span *s = span_find(r, epoch);
   pb_status status = span_check(s, epoch, err);
   if (status) return status;
+  if (epoch == 0) tell_choice(r, s);
   run.epoch = s->epoch;
   run.steps = s->last_step + 1;
   run.revision = pb_recording_revision(r, s->first_revision);

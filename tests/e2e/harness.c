@@ -105,7 +105,11 @@ int e2e_reap(e2e_child *child) {
 }
 
 e2e_daemon e2e_daemon_start(const char *plant, const char *const *more) {
-  e2e_daemon daemon = {.domain = e2e_domain()};
+  return e2e_daemon_start_on(e2e_domain(), plant, more);
+}
+
+e2e_daemon e2e_daemon_start_on(uint32_t on, const char *plant, const char *const *more) {
+  e2e_daemon daemon = {.domain = on};
   char domain[16], line[256];
   snprintf(domain, sizeof domain, "%u", daemon.domain);
   const char *argv[16] = {PB_BIN "/plantbusd", "--plant", plant, "--domain", domain};

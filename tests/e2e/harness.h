@@ -45,6 +45,9 @@ typedef struct e2e_daemon {
 } e2e_daemon;
 e2e_daemon e2e_daemon_start(const char *plant, const char *const *more);
 
+// … in the domain of another one that has ended.
+e2e_daemon e2e_daemon_start_on(uint32_t domain, const char *plant, const char *const *more);
+
 // SIGTERM, and the exit status 0 that belongs to it.
 void e2e_daemon_end(e2e_daemon *daemon);
 

@@ -5,6 +5,8 @@
 #include "recording_export.h"
 #include "support/check.h"
 
+static const pb_mcap_writer_options plain = {.library = "test"};
+
 static char folder[] = "/tmp/pb-recording-XXXXXX";
 
 static const char *path_of(const char *name) {
@@ -136,7 +138,7 @@ static void write_two_revisions(void) {
   pb_bytes b = {0};
   pb_error failed = {0};
   uint16_t channel;
-  REQUIRE(pb_mcap_writer_create(path_of("a.mcap"), "", "test", &w, &err));
+  REQUIRE(pb_mcap_writer_create(path_of("a.mcap"), &plain, &w, &err));
   REQUIRE(pb_mcap_writer_channel(w, 0, "plantbus/v1/sample", "cdr", NULL, 0, &channel, &err));
   put_revision(w, "1", "[\"y\"]", "[\"m\"]", "plant.json", "{\"n\": 1}");
   for (uint32_t k = 0; k < 20; k++) {
@@ -207,7 +209,7 @@ static void other_files_are_refused(void **state) {
     pb_mcap_writer *w = NULL;
     pb_recording *r = NULL;
     pb_error failed = {0};
-    REQUIRE(pb_mcap_writer_create(path_of("a.mcap"), "", "test", &w, &err));
+    REQUIRE(pb_mcap_writer_create(path_of("a.mcap"), &plain, &w, &err));
     if (outputs[i]) put_revision(w, "1", outputs[i], "[\"m\"]", "plant.json", "{}");
     REQUIRE(pb_mcap_writer_close(w, &err));
     assert_int_equal(pb_recording_open(path_of("a.mcap"), &r, &failed), PB_ERR_SYNTAX);
