@@ -31,8 +31,8 @@ static bool all_held(const double *lambda, size_t p) {
 }
 
 // Fixed-interface modes: Φ (p × p, M-normalised) and their frequencies.
-static pb_status solve_interior(const char *name, const pb_element_data *e, interior *x,
-                                double *phi, double *mii, pb_error *err) {
+static pb_status solve_interior(const char *name, interior *x, double *phi, double *mii,
+                                pb_error *err) {
   int p = (int)x->p, itype = 1, info = 0, lwork = 1 + 6 * p + 2 * p * p, liwork = 3 + 5 * p;
   double *work = malloc((size_t)lwork * sizeof *work), *m = NULL;
   int *iwork = malloc((size_t)liwork * sizeof *iwork);
@@ -96,7 +96,7 @@ pb_status interior_make(const char *name, const pb_element_data *e, interior *x,
   x->hz = malloc((x->p + 1) * sizeof *x->hz);
   bool ok = phi && mii && t && work && x->k && x->m && x->hz;
   pb_status st = ok ? PB_OK : pb_fail_memory(err, name);
-  if (!st) st = solve_interior(name, e, x, phi, mii, err);
+  if (!st) st = solve_interior(name, x, phi, mii, err);
   if (!st) {
     make_transform(e, x, phi, t);
     congruence(t, e->k, n, work, x->k);
