@@ -32,6 +32,37 @@ static bool pair(const double *a, double h, double *ad, double *gd) {
   return true;
 }
 
+// ∫₀ʰ e^{λ s} ds.
+static double held(double lambda, double h) {
+  return lambda != 0 ? expm1(lambda * h) / lambda : h;
+}
+
+// A = [[a_0, ·], [·, a_3]] with real eigenvalues λ_1, λ_2, |λ_1| the larger: f(A h) = f(λ_1 h) P +
+// f(λ_2 h) (I − P), P = (A − λ_2 I)/(λ_1 − λ_2). Each eigenvalue and both diagonal entries of P,
+// whose sum is 1, are formed without cancellation, so that the slow one keeps its digits beside a
+// fast one of any size.
+static bool real_pair(const double *a, double h, double *ad, double *gd) {
+  double mu = 0.5 * (a[0] + a[3]), half = 0.5 * (a[0] - a[3]), off = a[1] * a[2];
+  double discriminant = half * half + off;
+  if (!(discriminant > 0.01 * mu * mu) || !isfinite(discriminant)) return false;
+  double nu = sqrt(discriminant), fast = mu < 0 ? mu - nu : mu + nu;
+  if (!(fabs(fast) * h > 1)) return false;  // no squaring is needed, and differences would cancel
+  double slow = (a[0] * a[3] - off) / fast, gap = fast - slow, p0 = a[0] - slow, p3 = a[3] - slow;
+  if (fabs(p0) < fabs(p3))
+    p0 = off / p3;
+  else
+    p3 = off / p0;
+  const double e[2] = {exp(fast * h), exp(slow * h)}, g[2] = {held(fast, h), held(slow, h)};
+  p0 /= gap, p3 /= gap;
+  ad[0] = e[0] * p0 + e[1] * p3, ad[3] = e[0] * p3 + e[1] * p0;
+  gd[0] = g[0] * p0 + g[1] * p3, gd[3] = g[0] * p3 + g[1] * p0;
+  for (int i = 1; i < 3; i++) {
+    ad[i] = (g[0] * fast - g[1] * slow) / gap * a[i];
+    gd[i] = (g[0] - g[1]) / gap * a[i];
+  }
+  return true;
+}
+
 static void multiply(int n, const double *a, const double *b, double *c) {
   double one = 1, zero = 0;
   dgemm_("N", "N", &n, &n, &n, &one, a, &n, b, &n, &zero, c, &n);
@@ -96,7 +127,12 @@ static bool exponential(size_t size, double *x, double *work, int *pivot) {
 
 pb_status pb_block_discretize(size_t n, const double *a, double h, double *ad, double *gd,
                               pb_error *err) {
-  if (n == 2 && pair(a, h, ad, gd)) return PB_OK;
+  if (n == 1) {
+    ad[0] = exp(a[0] * h);
+    gd[0] = held(a[0], h);
+    return PB_OK;
+  }
+  if (n == 2 && (pair(a, h, ad, gd) || real_pair(a, h, ad, gd))) return PB_OK;
   size_t m = 2 * n;
   double *x = pb_array_zero(8 * m * m, sizeof *x);
   int *pivot = malloc(m * sizeof *pivot);

@@ -244,6 +244,57 @@ static void test_truncation_keeps_slow_poles(void **state) {
   pb_model_free(m);
 }
 
+// An overdamped pair: the slow eigenvalue of 1e-9/s beside one of 1e9/s, 1 − e^{−t·1e-9} after 1e8
+// s whatever the period, and the static gain kept.
+static void test_overdamped_pair(void **state) {
+  (void)state;
+  static const struct {
+    double hz;
+    uint64_t steps;
+  } at[] = {{1e-8, 1}, {1e-2, 1000000}};
+  for (size_t k = 0; k < 2; k++) {
+    char text[1024];
+    snprintf(text, sizeof text, "\"sample_rate\": %g, %s", at[k].hz, GUIDED("1", "1", "1e9"));
+    pb_model *m = compile(text);
+    pb_state *s = pb_state_new(m);
+    double u = 1, y;
+    while (s->step < at[k].steps) pb_step_advance(m, s, &u);
+    pb_step_output(m, s, &y);
+    ASSERT_RELATIVE(y, -expm1(-0.1), k ? 1e-8 : 1e-14);
+    free(s);
+    pb_model_free(m);
+  }
+}
+
+// The hold of two real eigenvalues against long double: signs, sizes and couplings of every kind.
+static void test_hold_of_real_pairs(void **state) {
+  (void)state;
+  static const double a[][4] = {
+      {0, -1, 1, -1e9},     {0, -4, 4, -9},       {-1e6, 0, 3, -1e-6},
+      {-1e-6, 2, 0, -1e6},  {-3, 1, 2, -4},       {0, 0, 1, -7},
+      {-5e-3, 1, 1, -1e12}, {0, -1e4, 1e4, -1e8}, {-2e5, 7e-4, 3e-2, -1e-2}};
+  for (size_t k = 0; k < sizeof a / sizeof *a; k++) {
+    const long double h = 1e-3L, mu = ((long double)a[k][0] + a[k][3]) / 2,
+                      half = ((long double)a[k][0] - a[k][3]) / 2,
+                      off = (long double)a[k][1] * a[k][2], nu = sqrtl(half * half + off);
+    const long double fast = mu - nu, slow = ((long double)a[k][0] * a[k][3] - off) / fast;
+    const long double g1 = expm1l(fast * h) / fast, g2 = slow != 0 ? expm1l(slow * h) / slow : h;
+    double ad[4], gd[4];
+    REQUIRE(pb_block_discretize(2, a[k], 1e-3, ad, gd, &err));
+    for (int i = 1; i < 3; i++) {
+      const long double e = (expm1l(fast * h) - expm1l(slow * h)) / (fast - slow) * a[k][i];
+      ASSERT_NEAR(ad[i], (double)e, 1e-13 * fabs((double)e));
+      ASSERT_NEAR(gd[i], (double)((g1 - g2) / (fast - slow) * a[k][i]), 1e-13 * fabs(gd[i]));
+    }
+    // Trace and determinant: sums and products of what the eigenvalues give.
+    ASSERT_RELATIVE(ad[0] + ad[3], (double)(expl(fast * h) + expl(slow * h)), 1e-14);
+    ASSERT_RELATIVE(gd[0] + gd[3], (double)(g1 + g2), 1e-14);
+    // A G = A_d − I, where the rows of A are not far apart in size.
+    const double row = a[k][0] * gd[0] + a[k][2] * gd[1];
+    ASSERT_NEAR(row, ad[0] - 1, 1e-13);
+  }
+}
+
 // Numbers that are each allowed but overflow together are refused, not computed with.
 static void test_overflow_is_refused(void **state) {
   (void)state;
@@ -334,6 +385,8 @@ int main(void) {
       cmocka_unit_test(test_critical_damping),
       cmocka_unit_test(test_truncation_keeps_static_gains),
       cmocka_unit_test(test_truncation_keeps_slow_poles),
+      cmocka_unit_test(test_overdamped_pair),
+      cmocka_unit_test(test_hold_of_real_pairs),
       cmocka_unit_test(test_overflow_is_refused),
       cmocka_unit_test(test_sampled_response_is_what_steps_do),
       cmocka_unit_test(test_derivative),
