@@ -20,8 +20,9 @@ pb_status pb_block_diagonalize(size_t n, double *a, double *v, size_t *blocks, s
                                const char *context, pb_error *err);
 
 // Exact zero-order hold of one block: ad = e^{A h}, gd = ∫₀ʰ e^{A s} ds, both n × n. Complex 2 × 2
-// pairs and pairs of separate real eigenvalues in closed form, everything else by scaling and squaring of the augmented matrix [[A, I],
-// [0, 0]] with a [13/13] Padé approximant (Higham, SIAM J. Matrix Anal. Appl. 26, 2005). [init]
+// pairs and pairs of separate real eigenvalues in closed form, everything else by scaling and
+// squaring of the augmented matrix [[A, I], [0, 0]] with a [13/13] Padé approximant (Higham, SIAM
+// J. Matrix Anal. Appl. 26, 2005). [init]
 pb_status pb_block_discretize(size_t n, const double *a, double h, double *ad, double *gd,
                               pb_error *err);
 

@@ -9,6 +9,7 @@
 #include "base/lapack.h"
 #include "base/text.h"
 #include "model/block.h"
+#include "model/rates.h"
 #include "model/step_kernel.h"
 
 static const double two_pi = 6.283185307179586476925286766559;
@@ -83,6 +84,7 @@ pb_status pb_model_builder_open(pb_model_builder *b, size_t nx, size_t nu, size_
   b->capacity = 2 * nx;
   b->plain = false;
   b->direct = nu;
+  b->rest = NULL;
   b->model = pb_model_allocate(nx, nu, ny, modes, nx, b->capacity);  // at most nx blocks
   if (!b->model) return pb_fail_memory(err, "");
   b->model->blocks = 0;
@@ -283,30 +285,94 @@ static bool nothing_moves(const pb_model *m, const rank *order) {
   return true;
 }
 
-// The blocks of m in this order, those above hz (0: none) gone into the first columns of d.
+// What truncation keeps, and what velocities and accelerations see of the rest.
+typedef struct cut {
+  const pb_model *m;
+  const rank *order;
+  size_t direct;         // leading inputs whose columns of d count
+  size_t kept, fast;     // blocks
+  size_t nx, values;     // of the blocks that are kept
+  pb_residual residual;  // of the others
+} cut;
+
+static pb_status cut_make(cut *c, double hz, pb_error *err) {
+  pb_status st = pb_residual_open(c->m, c->direct, two_pi * hz, &c->residual, err);
+  for (size_t k = 0; k < c->m->blocks && !st; k++) {
+    const pb_model_part p = part_of(c->m, c->order[k].block);
+    if (c->order[k].fast)
+      c->fast++, st = pb_residual_add(&c->residual, c->m, c->order[k].block, err);
+    else
+      c->kept++, c->nx += p.size, c->values += p.size * p.size;
+  }
+  const size_t pairs = st ? 0 : pb_residual_count(&c->residual);
+  c->kept += pairs, c->nx += 2 * pairs, c->values += 4 * pairs;
+  return st;
+}
+
+static pb_status append_residual(const pb_residual *r, pb_model *m, pb_error *err) {
+  double a[4], *b = calloc(2 * m->nu + 1, sizeof *b), *c = malloc((3 * m->ny + 1) * sizeof *c);
+  pb_status st = b && c ? PB_OK : pb_fail_memory(err, "/max_frequency");
+  for (size_t i = 0; i < r->direct && !st; i++) {
+    if (!pb_residual_needs(r, i)) continue;
+    double *d = c + 2 * m->ny;
+    pb_residual_pair(r, i, a, b + 2 * i, c, d);
+    append(m,
+           &(pb_model_part){.size = 2, .a = a, .lda = 2, .b = b, .ldb = 2, .c = c, .ldc = m->ny});
+    for (size_t o = 0; o < m->ny; o++) m->d[o + i * m->ny] += d[o];
+    b[2 * i] = b[2 * i + 1] = 0;
+  }
+  free(b);
+  free(c);
+  return st;
+}
+
+// Blocks of other sizes stay last.
+static pb_status fill(const cut *c, pb_model *copy, pb_error *err) {
+  bool residual = false;
+  pb_status st = PB_OK;
+  for (size_t k = 0; k < c->m->blocks && !st; k++) {
+    const pb_model_part p = part_of(c->m, c->order[k].block);
+    if (c->order[k].odd && !residual) {
+      residual = true;
+      st = append_residual(&c->residual, copy, err);
+    }
+    if (st) break;
+    if (c->order[k].fast)
+      st = add_static(copy, &p, c->direct, err);
+    else
+      append(copy, &p);
+  }
+  if (!st && !residual) st = append_residual(&c->residual, copy, err);
+  return st;
+}
+
+// Accelerations of a copy rest as those of m do.
+static pb_status settle_like(const pb_model *m, size_t direct, pb_model *copy, pb_error *err) {
+  double *rest = malloc((m->ny * direct + 1) * sizeof *rest);
+  pb_status st = rest ? pb_rates_rest(m, direct, rest, err) : pb_fail_memory(err, "/outputs");
+  if (!st) st = pb_rates_settle(copy, rest, m->ny, direct, err);
+  free(rest);
+  return st;
+}
+
+// The blocks of m in this order, those above hz (0: none) gone into the first columns of d and into
+// residual pairs.
 static pb_status rebuild(const pb_model *m, const rank *order, double hz, size_t direct, bool steps,
                          pb_model **out, pb_error *err) {
-  size_t kept = 0, nx = 0, values = 0;
-  for (size_t k = 0; k < m->blocks; k++) {
-    if (order[k].fast) continue;
-    const pb_model_part p = part_of(m, order[k].block);
-    kept++, nx += p.size, values += p.size * p.size;
-  }
-  pb_model *copy = pb_model_allocate(nx, m->nu, m->ny, m->modes, kept, values);
-  pb_status st = copy ? copy_signals(m, copy, err) : pb_fail_memory(err, "");
+  cut c = {.m = m, .order = order, .direct = direct};
+  pb_model *copy = NULL;
+  pb_status st = cut_make(&c, hz, err);
+  if (!st) copy = pb_model_allocate(c.nx, m->nu, m->ny, m->modes, c.kept, c.values);
+  if (!st) st = copy ? copy_signals(m, copy, err) : pb_fail_memory(err, "");
   if (!st) {
     copy_header(m, direct, copy);
     copy->max_frequency = hz;
     copy->blocks = 0;
+    st = fill(&c, copy, err);
   }
-  for (size_t k = 0; k < m->blocks && !st; k++) {
-    pb_model_part p = part_of(m, order[k].block);
-    if (order[k].fast)
-      st = add_static(copy, &p, direct, err);
-    else
-      append(copy, &p);
-  }
+  if (!st && c.fast) st = settle_like(m, direct, copy, err);
   if (!st && steps) st = make_steps(copy, err);
+  pb_residual_close(&c.residual);
   if (st) {
     pb_model_free(copy);
   } else {
@@ -342,10 +408,11 @@ pb_status pb_model_narrow(const pb_model *m, size_t nu, size_t ny, pb_model **ou
 
 pb_status pb_model_builder_close(pb_model_builder *b, double max_frequency, pb_model **out,
                                  pb_error *err) {
-  rank *order = rank_blocks(b->model, max_frequency);
   pb_status st = PB_OK;
+  if (b->rest) st = pb_rates_settle(b->model, b->rest, b->rest_rows, b->direct, err);
+  rank *order = st ? NULL : rank_blocks(b->model, max_frequency);
   if (!order) {
-    st = pb_fail_memory(err, "");
+    if (!st) st = pb_fail_memory(err, "");
   } else if (nothing_moves(b->model, order) &&
              b->model->block_start[b->model->blocks] == b->model->nx) {
     b->model->max_frequency = max_frequency;

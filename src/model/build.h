@@ -9,6 +9,9 @@ typedef struct pb_model_builder {
   size_t capacity;  // of model->a
   bool plain;       // the model is to be narrowed, not to be stepped: not discretised
   size_t direct;    // leading inputs whose column of d is wanted; all unless the caller says less
+  const double *rest;  // rest_rows × direct, the caller's: static responses of accelerations
+                       // (rates.h); NULL: unknown
+  size_t rest_rows;
 } pb_model_builder;
 
 // One diagonal block: a size × size (leading dimension lda), b size × nu (ldb), c ny × size (ldc).
@@ -31,8 +34,8 @@ pb_status pb_model_builder_reserve(pb_model_builder *builder, const size_t *size
                                    size_t *first, pb_error *err);
 
 // Sorts the blocks by natural frequency, 2 × 2 blocks first; replaces those above max_frequency
-// (Hz; 0: none) by their static contribution; discretises unless it is plain. The builder is empty
-// afterwards.
+// (Hz; 0: none) by their static contribution and residual pairs (rates.h); discretises unless it is
+// plain. The builder is empty afterwards.
 pb_status pb_model_builder_close(pb_model_builder *builder, double max_frequency, pb_model **out,
                                  pb_error *err);
 

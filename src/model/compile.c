@@ -98,6 +98,23 @@ static void fill_feedthrough(const pb_system *s, const pb_modes *m, double *d, s
     dgemm_("N", "N", &ny, &nu, &n, &one, m->output[2], &ny, m->force, &n, &one, d, &rows);
 }
 
+// Static responses of accelerations, ny × nu: what forces do to rigid-body modes; what is held
+// rests. *known false: damping couples rigid-body modes to others.
+static pb_status rest_make(const pb_modes *m, double **out, bool *known, pb_error *err) {
+  const size_t ny = m->ny, nu = m->nu;
+  double *rest = *out = calloc(ny * nu + 1, sizeof *rest);
+  *known = true;
+  if (!rest) return pb_fail_memory(err, "/outputs");
+  for (size_t j = 0; j < m->rigid; j++) {
+    for (size_t k = m->rigid; k < m->n; k++)
+      *known = *known && !coupled(m, j, k) && !coupled(m, k, j);
+    for (size_t i = 0; i < nu; i++)
+      for (size_t o = 0; o < ny; o++)
+        rest[o + i * ny] += m->output[2][o + j * ny] * m->force[j + i * m->n];
+  }
+  return PB_OK;
+}
+
 // The electronics of one list of ports, the caller's; NULL where no port has any.
 static pb_status list_electronics(const pb_port *port, size_t ports, size_t count,
                                   pb_electronics **out, pb_error *err) {
@@ -142,6 +159,8 @@ pb_status pb_model_compile_with(const pb_system *s, const pb_means *lent, pb_war
   *out = NULL;
   pb_modes modes = {0};
   pb_model_builder builder = {0};
+  double *rest = NULL;
+  bool known = false;
   const size_t nu = s->nu + 2 * s->stacked, ny = s->ny + 2 * s->stacked;
   pb_mode_store_begin(means.modes);
   pb_phase_begin(means.observer, PB_PHASE_MODES);
@@ -152,6 +171,8 @@ pb_status pb_model_compile_with(const pb_system *s, const pb_means *lent, pb_war
   builder.direct = s->nu;
   if (!st) st = fill_header(s, &modes, builder.model, err);
   if (!st) st = build_groups(&modes, &means, &builder, err);
+  if (!st) st = rest_make(&modes, &rest, &known, err);
+  if (!st && known) builder.rest = rest, builder.rest_rows = s->ny;
   pb_modes_clear(&modes);
   pb_phase_begin(means.observer, PB_PHASE_DISCRETIZE);
   if (!st && s->relaxations == 0)
@@ -159,6 +180,7 @@ pb_status pb_model_compile_with(const pb_system *s, const pb_means *lent, pb_war
   else if (!st)
     st = pb_model_relax(s, &builder, out, err);
   pb_model_builder_discard(&builder);
+  free(rest);
   return st;
 }
 

@@ -185,7 +185,6 @@ static pb_status respond(const pb_model *m, pb_time_base base, const double *hz,
   for (size_t f = 0; f < nf; f++) {
     const double w = two_pi * hz[f];
     q[f] = sampled ? turn(w / m->sample_rate) : I * w;
-    begin(m, sampled, sampled ? 1 + q[f] : q[f], h + f * entries, NULL);
   }
   pb_status st = pb_pairs_response(m, at.a, at.b, sampled ? 1 : 0, q, nf, h, err);
   for (size_t f = 0; f < nf && !st; f++) {

@@ -208,6 +208,9 @@ pb_status pb_model_relax(const pb_system *s, pb_model_builder *builder, pb_model
   }
   if (!st) st = pb_model_builder_open(&closed, l.nx, l.nu, l.ny, open->modes, err);
   closed.plain = builder->plain;
+  closed.direct = l.z;
+  closed.rest = builder->rest;
+  closed.rest_rows = builder->rest_rows;
   if (!st) st = pb_model_copy_header(open, closed.model, err);
   for (size_t i = 0; i < l.nu && !st; i++)
     for (size_t o = 0; o < l.ny; o++)

@@ -157,6 +157,32 @@ static void add_static(const pb_transfer *t, work *w) {
   multiply(to->nx, from->nu, to->n, -1.0, to->bq, w->force, 1.0, t->u);
 }
 
+// States of residual pairs (rates.h): the only ones in which no coordinate takes part.
+static bool is_residual(const pb_motion_map *map, size_t state) {
+  for (size_t r = 0; r < map->n; r++)
+    if (map->bq[state + r * map->nx] != 0 || map->bv[state + r * map->nx] != 0) return false;
+  return true;
+}
+
+static bool has_residual(const pb_motion_map *map) {
+  for (size_t j = 0; j < map->nx; j++)
+    if (is_residual(map, j)) return true;
+  return false;
+}
+
+// A residual pair, of the states x_1 = P u_i and x_2, rests under the input that is held: x_1 =
+// u_i.
+static void set_residual(const pb_transfer *t) {
+  const pb_model *to = t->to;
+  for (size_t j = 0; j + 1 < to->nx; j++) {
+    if (!is_residual(t->to_map, j)) continue;
+    for (size_t i = 0; i < to->nu; i++)
+      if (to->b[j + 1 + i * to->nx] != 0 && t->input_from[i] >= 0)
+        t->u[j + (size_t)t->input_from[i] * to->nx] = 1;
+    j++;
+  }
+}
+
 static pb_status x_new(pb_transfer *t, pb_error *err) {
   t->x = pb_array_new(t->to->nx * t->from->nx, sizeof *t->x);
   return t->x ? PB_OK : pb_fail_memory(err, "transfer");
@@ -172,12 +198,13 @@ static pb_status matrices_make(pb_transfer *t, const pb_workers *workers, pb_err
   w.force = pb_array_new(to->n * from->nu + 1, sizeof(double));
   if (!st && (!w.ml || !w.bml || !w.static_ || !w.force)) st = pb_fail_memory(err, "transfer");
   if (!st) st = multiply_blocks(to->n, from->n, to->n, to->m, w.l, w.ml, workers, err);
-  const bool same = !st && same_motion(from, to, w.l);
+  const bool residual = has_residual(to), same = !st && !residual && same_motion(from, to, w.l);
   if (!st && !same) st = x_new(t, err);
   if (!st && !same) st = add_part(t, &w, to->bv, from->cv, 0, workers, err);
   if (!st && !same) st = add_part(t, &w, to->bq, from->cq, 1, workers, err);
   if (same) st = multiply_blocks(to->nx, from->n, to->n, to->bq, w.ml, w.bml, workers, err);
   if (!st) add_static(t, &w);  // with what the displacements have left
+  if (!st && residual) set_residual(t);
   work_clear(&w);
   return st;
 }

@@ -3,8 +3,8 @@
 // What a component was doing it goes on doing: the motion q, q̇ of the old plant's components is
 // given to those of the same name in the new one (the frames they share, where the kind has
 // changed; what an element has inside follows its frames statically), and projected on the motions
-// that the new plant can make (motion_map.h). All of it is linear: x' = X x + U u, prepared in one
-// thread and applied in another, which steps.
+// that the new plant can make (motion_map.h). Residual pairs (rates.h) rest under the held inputs.
+// All of it is linear: x' = X x + U u, prepared in one thread and applied in another, which steps.
 #ifndef PB_MODEL_TRANSFER_H
 #define PB_MODEL_TRANSFER_H
 

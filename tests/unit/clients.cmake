@@ -8,6 +8,9 @@ pb_test(client_plot LABELS unit SOURCES test_plot.c LIBS plantbus_client_common)
 # Transmission zeros (src/model/zeros).
 pb_test(unit_zeros LABELS unit SOURCES test_zeros.c)
 
+# Velocities and accelerations (src/model/rates).
+pb_test(unit_rates LABELS unit SOURCES test_rates.c)
+
 # Recordings (clients/mcap).
 pb_test(client_mcap LABELS unit SOURCES test_mcap.c mcap_parse.c LIBS plantbus_mcap)
 pb_test(client_recording LABELS unit SOURCES test_recording.c LIBS plantbus_mcap)
