@@ -24,7 +24,9 @@ static const char convention[] =
     "y(k) = C x(k) + D u(k-1), y before u(k) acts. A_d, B_d, C, D are no standard state space "
     "where D is not 0. Standard: ss(A_ss, B_ss, C_ss, D_ss, Ts), whose last states are the "
     "inputs 'held' over the last interval (numbers from 1). Continuous: ss(A, B, C, D). "
-    "Without the electronics of the signals.";
+    "Without the electronics of the signals. Zeros of the sampled forms are not those of the "
+    "plant: sampling adds some and may turn the sign of the damping of others (plantbus-model "
+    "zeros).";
 
 typedef struct export {
   const tool *t;

@@ -23,10 +23,10 @@ int command_modes(const tool *t, const pb_model *model) {
 
 // ---- poles --------------------------------------------------------------------------------------
 
-// Roots in columns of their own: |s|/2π, damping, real and imaginary part.
+// Roots in columns of their own: |s|/2π, damping, real and imaginary part, |Im s|/2π.
 typedef struct root_list {
   size_t count;
-  double *hz, *damping, *real, *imag;  // one block of memory, at hz
+  double *hz, *damping, *real, *imag, *oscillation;  // one block of memory, at hz
 } root_list;
 
 // The continuous-time equivalent of a root; sampled roots z = e^{sT}.
@@ -36,12 +36,13 @@ static double complex as_continuous(double complex root, bool sampled, double ra
 
 static bool root_list_fill(const tool *t, const double complex *root, size_t count, double rate,
                            root_list *list) {
-  double *data = malloc((4 * count + 1) * sizeof *data);
+  double *data = malloc((5 * count + 1) * sizeof *data);
   *list = (root_list){.hz = data};
   if (!data) return false;
   list->damping = data + count;
   list->real = list->damping + count;
   list->imag = list->real + count;
+  list->oscillation = list->imag + count;
   for (size_t k = 0; k < count; k++) {
     double complex s = as_continuous(root[k], t->sampled, rate);
     double size = cabs(s);
@@ -51,6 +52,7 @@ static bool root_list_fill(const tool *t, const double complex *root, size_t cou
     list->damping[n] = size > 0 ? -creal(s) / size : 0;
     list->real[n] = creal(root[k]);
     list->imag[n] = cimag(root[k]);
+    list->oscillation[n] = fabs(cimag(s)) / two_pi;
   }
   return true;
 }
@@ -61,8 +63,9 @@ static int emit_poles(const tool *t, const root_list *list, const char *unit) {
       {"damping", "damping", NULL, 4, list->damping},
       {"real", "real part", unit, 7, list->real},
       {"imag", "imaginary part", unit, 7, list->imag},
+      {"oscillation_hz", "oscillates at", "Hz", 7, list->oscillation},
   };
-  return emit_columns(t, &(columns){.count = 4, .rows = list->count, .column = c});
+  return emit_columns(t, &(columns){.count = 5, .rows = list->count, .column = c});
 }
 
 static int compare_size(const void *a, const void *b) {
@@ -85,6 +88,23 @@ static int plot_roots(const tool *t, const char *title, const double complex *po
   return emit_done(t, pb_plot_locus(t->out, &plot, &err), &err);
 }
 
+// Poles of the plant that oscillate above half the sample rate: sampled ones are at aliases.
+static pb_status print_aliases(const tool *t, const pb_model *model, pb_error *err) {
+  pb_sampled_root *root = NULL;
+  size_t count = 0, above = 0;
+  pb_status st = pb_model_sampled_poles(model, 0, &root, &count, err);
+  for (size_t k = 0; k < count && !st; k++) above += !root[k].has_sampled;
+  const double nyquist = 0.5 * model->sample_rate;
+  if (!st && above > 0 && t->sampled)
+    printf("%zu %s: above %g Hz, half the sample rate, in the plant.\n", above,
+           above == 1 ? "pair is an alias" : "pairs are aliases", nyquist);
+  else if (!st && above > 0)
+    printf("%zu %s above %g Hz, half the sample rate: aliases in the sampled plant (--sampled).\n",
+           above, above == 1 ? "pair is" : "pairs are", nyquist);
+  free(root);
+  return st;
+}
+
 int command_poles(const tool *t, const pb_model *model) {
   pb_error err = {0};
   root_list list = {0};
@@ -99,6 +119,7 @@ int command_poles(const tool *t, const pb_model *model) {
   }
   int code = tool_end(status, &err);
   if (!code) code = emit_poles(t, &list, t->sampled ? NULL : "rad/s");
+  if (!code && wants_table(t)) code = tool_end(print_aliases(t, model, &err), &err);
   if (!code && t->out_format == FORMAT_PNG) {
     for (size_t k = 0; k < model->nx; k++) {
       pole[k] = as_continuous(pole[k], t->sampled, model->sample_rate);
@@ -112,7 +133,7 @@ int command_poles(const tool *t, const pb_model *model) {
 
 // ---- zeros, of the plant and of the sampled plant -----------------------------------------------
 
-enum { ZERO_COLUMNS = 7 };
+enum { ZERO_COLUMNS = 8 };
 
 typedef struct zero_list {
   size_t count;
@@ -133,7 +154,8 @@ static bool zero_list_fill(const pb_sampled_root *root, size_t count, zero_list 
                                       cimag(r->s),
                                       r->has_sampled ? r->sampled_hz : NAN,
                                       r->has_sampled ? r->sampled_damping : NAN,
-                                      (double)r->multiplicity};
+                                      (double)r->multiplicity,
+                                      r->sign_differs};
     for (int twin = 0; twin < (cimag(r->s) > 0 ? 2 : 1); twin++, list->count++)
       for (size_t c = 0; c < ZERO_COLUMNS; c++)
         list->value[c][list->count] = c == 3 && twin ? -row[c] : row[c];
@@ -165,9 +187,11 @@ static int emit_zeros(const tool *t, const pb_model *model, const pb_sampled_roo
       {"sampled_hz", "sampled", "Hz", 7, list.value[4]},
       {"sampled_damping", "sampled damping", NULL, 4, list.value[5]},
       {"multiplicity", "multiplicity", NULL, 1, list.value[6]},
+      {"sign_by_sampling", "sign by sampling", NULL, 1, list.value[7]},
   };
-  int code = emit_columns(
-      t, &(columns){.count = ZERO_COLUMNS, .rows = list.count, .column = c, .channels = ch});
+  const size_t shown = wants_table(t) ? ZERO_COLUMNS - 1 : ZERO_COLUMNS;  // a line tells it there
+  int code =
+      emit_columns(t, &(columns){.count = shown, .rows = list.count, .column = c, .channels = ch});
   if (!code && wants_table(t)) print_signs(model, root, count);
   free(list.value[0]);
   return code;

@@ -224,10 +224,23 @@ static void test_modes_poles_zeros(void **state) {
   assert_int_equal(cJSON_GetArraySize(member(tree, "damping")), 2);
   cJSON_Delete(tree);
 
+  // Whatever z is, a sampled pole oscillates at half the sample rate at most; real parts are of z.
+  tree = run_json("poles --sampled --json " BENCH);
+  assert_int_equal(cJSON_GetArraySize(member(tree, "oscillation_hz")), 4);
+  for (int k = 0; k < 4; k++) {
+    const double complex z = at(member(tree, "real"), k) + I * at(member(tree, "imag"), k);
+    const double seen = at(member(tree, "oscillation_hz"), k);
+    ASSERT_NEAR(seen, fabs(carg(z)) / (2 * M_PI) * 10000, 1e-6);
+    assert_true(seen <= 5000);
+  }
+  cJSON_Delete(tree);
+
   // Vs = 0 when z_u = z_i: m_u s² + c_1 s + k_1 = 0.
   double re = -c_1 / (2 * m_u), im = sqrt(k_1 / m_u - re * re);
   tree = run_json("zeros " BENCH " --input Va --output Vs --json");
   assert_int_equal(cJSON_GetArraySize(member(tree, "real")), 2);
+  assert_int_equal(at(member(tree, "sign_by_sampling"), 0),
+                   at(member(tree, "sampled_damping"), 0) < 0);
   ASSERT_RELATIVE(at(member(tree, "real"), 0), re, 1e-9);
   ASSERT_RELATIVE(at(member(tree, "imag"), 0), im, 1e-10);
   ASSERT_RELATIVE(at(member(tree, "imag"), 1), -im, 1e-10);
@@ -489,6 +502,8 @@ static void test_tables(void **state) {
       {"check " BENCH, "usable"},
       {"modes " BENCH, "frequency [Hz]"},
       {"zeros " BENCH, "38.76834"},
+      {"poles " BENCH, "1 pair is above 5000 Hz"},
+      {"poles --sampled " BENCH, "1 pair is an alias"},
       {"frf " BENCH " --frequencies 10 --input Va --output y", "magnitude [m/V]"},
       {"step " BENCH " --steps 2", "Va = 1 V from step 0"},
       {"info " HEXAPOD, "nano-hexapod"},
