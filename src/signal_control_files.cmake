@@ -7,5 +7,5 @@ set(PB_SIGNAL_CONTROL_SOURCES
   control/jacobian.c control/loop.c
   control/loop_newton.c control/loop_poles.c control/loop_solver.c control/loop_stable.c
   control/lti.c control/lti_analysis.c control/lti_c2d.c control/lti_model.c control/lti_ops.c
-  control/margins.c control/margins_mimo.c control/pole_track.c control/poles.c control/rootlocus.c control/transient.c
+  control/margins.c control/margins_mimo.c control/pole_match.c control/pole_track.c control/poles.c control/rootlocus.c control/transient.c
 )

@@ -37,10 +37,12 @@ static error_t parse(int key, char *text, struct argp_state *state) {
 
 static pb_status check(const control_design *d, pb_error *err) {
   if (d->stable || d->options->iff.force) return PB_OK;
+  char pole[96];
+  pb_pole_format(d->worst, d->model->sample_rate, pole, sizeof pole);
   return pb_fail(err, PB_ERR_STATE, "--bandwidth",
-                 "with %g Hz the closed loop is predicted to be unstable: a pole at %.6g Hz with "
-                 "damping %.3g %% (--force closes it all the same)",
-                 d->shape.bandwidth_hz, d->worst.hz, 100 * d->worst.damping);
+                 "with %g Hz the closed loop is predicted to be unstable: a pole at %s (--force "
+                 "closes it all the same)",
+                 d->shape.bandwidth_hz, pole);
 }
 
 static pb_status choose_channels(run_result *r, pb_error *err) {

@@ -109,10 +109,10 @@ static void print_mimo(const control_judgement *j) {
 }
 
 static void print_proof(const control_design *d) {
-  printf("%s: of the sampled closed loop's poles (%zu states) the largest has |z| = %.9f (%.5g Hz, "
-         "damping %.3g %%)\n",
-         d->stable ? "Stable" : "UNSTABLE", d->closed_states, cabs(d->worst.z), d->worst.hz,
-         100 * d->worst.damping);
+  char pole[96];
+  pb_pole_format(d->worst, d->model->sample_rate, pole, sizeof pole);
+  printf("%s: of the sampled closed loop's poles (%zu states) the largest has |z| = %.9f (%s)\n",
+         d->stable ? "Stable" : "UNSTABLE", d->closed_states, cabs(d->worst.z), pole);
   if (!d->stable || isnan(d->gain_up)) return;
   printf("By these poles HAC's gain, all loops together, may be multiplied by %.4g … ",
          d->gain_down);

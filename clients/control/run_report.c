@@ -11,6 +11,7 @@ static pb_status print_stages(const run_result *r, pb_error *err) {
   pb_table_number_column(&t, "samples", NULL, 9);
   pb_table_number_column(&t, "seconds", "s", 3);
   pb_table_number_column(&t, "lines used", "%", 4);
+  pb_table_number_column(&t, "below floor", "%", 4);
   pb_table_number_column(&t, "magnitude error", "%", 3);
   pb_table_number_column(&t, "phase error", "°", 3);
   pb_table_number_column(&t, "worst", "Hz", 5);
@@ -25,9 +26,10 @@ static pb_status print_stages(const run_result *r, pb_error *err) {
     pb_table_count(&t, s->response.report.samples);
     pb_table_number(&t, s->response.report.seconds);
     pb_table_number(&t, 100.0 * (double)a->used / (double)a->lines);
-    pb_table_number(&t, a->magnitude_percent);
-    pb_table_number(&t, a->phase_degree);
-    pb_table_number(&t, a->worst_hz);
+    pb_table_number(&t, 100.0 * (double)a->below / (double)a->lines);
+    pb_table_number(&t, a->used ? a->magnitude_percent : NAN);
+    pb_table_number(&t, a->used ? a->phase_degree : NAN);
+    pb_table_number(&t, a->used ? a->worst_hz : NAN);
     pb_table_number(&t, largest);
   }
   printf("\nResponses to the disturbances, measured beside predicted (all outputs, where coherence "
@@ -106,6 +108,7 @@ static void json_stage(pb_jsonout *o, const run_result *r, control_stage stage) 
   pb_jsonout_number(o, "phase_error_degree", a->phase_degree);
   pb_jsonout_number(o, "worst_hz", a->worst_hz);
   pb_jsonout_integer(o, "used", a->used);
+  pb_jsonout_integer(o, "below_floor", a->below);
   pb_jsonout_integer(o, "lines", a->lines);
   pb_jsonout_integer(o, "missed", s->trouble.gaps);
   pb_jsonout_integer(o, "flagged", s->trouble.flagged);

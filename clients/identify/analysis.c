@@ -5,7 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FIT_CHANNELS = 8, CLOSE_ROWS = 6 };
+#include "control/pole_match.h"
+
+enum { FIT_CHANNELS = 8, CLOSE_ROWS = 24 };
 
 void pb_analysis_clear(pb_analysis *a) {
   for (size_t k = 0; a->row && k < a->rows; k++) free(a->row[k].zero);
@@ -13,20 +15,37 @@ void pb_analysis_clear(pb_analysis *a) {
   free(a->mode);
   free(a->agreement);
   free(a->exact);
+  free(a->exact_floor);
   if (a->early.h != a->frf.h) free(a->early.h);
   pb_frf_clear(&a->frf);
   *a = (pb_analysis){0};
 }
 
+// 180 dB below the largest response of the output: what a sum of modes that cancel each other
+// leaves.
+static const double rounding_range = 1e-9;
+
+void pb_response_floor(const double complex *h, size_t nu, const size_t *output, size_t outputs,
+                       double *floor) {
+  for (size_t o = 0; o < outputs; o++) {
+    double largest = 0;
+    for (size_t i = 0; i < nu; i++) largest = fmax(largest, cabs(h[output[o] * nu + i]));
+    floor[o] = rounding_range * largest;
+  }
+}
+
 pb_status pb_exact_responses(const pb_model *model, pb_time_base base,
                              const pb_experiment_channels *ch, const double *hz, size_t nf,
-                             double complex **out, pb_error *err) {
+                             double complex **out, double **floor, pb_error *err) {
   size_t all = model->ny * model->nu, some = ch->outputs * ch->inputs;
   double complex *h = malloc(all * sizeof *h);
   *out = malloc((nf * some + 1) * sizeof **out);
-  pb_status status = h && *out ? PB_OK : pb_fail_memory(err, "responses");
+  *floor = malloc((nf * ch->outputs + 1) * sizeof **floor);
+  pb_status status = h && *out && *floor ? PB_OK : pb_fail_memory(err, "responses");
   for (size_t f = 0; f < nf && status == PB_OK; f++) {
     status = pb_model_frf(model, base, &hz[f], 1, h, err);
+    if (status == PB_OK)
+      pb_response_floor(h, model->nu, ch->output, ch->outputs, *floor + f * ch->outputs);
     for (size_t k = 0; k < some && status == PB_OK; k++) {
       (*out)[f * some + k] = h[ch->output[k / ch->inputs] * model->nu + ch->input[k % ch->inputs]];
     }
@@ -34,7 +53,9 @@ pb_status pb_exact_responses(const pb_model *model, pb_time_base base,
   free(h);
   if (status != PB_OK) {
     free(*out);
+    free(*floor);
     *out = NULL;
+    *floor = NULL;
   }
   return status;
 }
@@ -73,7 +94,8 @@ static double largest_of_line(const pb_frf *frf, const double complex *exact, si
 // 100 dB below the largest response of the line counts as noise, as does three standard deviations.
 static const double dynamic_range = 1e-5;
 
-pb_agreement pb_agreement_of(const pb_frf *frf, const double complex *exact, size_t o) {
+pb_agreement pb_agreement_of(const pb_frf *frf, const double complex *exact,
+                             const double *exact_floor, size_t o) {
   pb_agreement a = {.lines = frf->nf * frf->nu, .coherence = 1};
   for (size_t f = 0; f < frf->nf; f++) {
     double coherence = frf->coherence[f * frf->ny + o];
@@ -81,6 +103,10 @@ pb_agreement pb_agreement_of(const pb_frf *frf, const double complex *exact, siz
     a.coherence = fmin(a.coherence, coherence);
     for (size_t i = 0; i < frf->nu; i++) {
       size_t k = (f * frf->ny + o) * frf->nu + i;
+      if (!(cabs(exact[k]) > exact_floor[f * frf->ny + o])) {
+        a.below++;
+        continue;
+      }
       double floor = fmax(3 * sqrt(frf->variance[k]), hidden);
       if (!(coherence > 0.99) || !(cabs(frf->h[k]) > floor)) continue;
       double complex ratio = frf->h[k] / exact[k];
@@ -101,13 +127,14 @@ static pb_status compare(pb_analysis *a, pb_error *err) {
   if (!a->agreement) return pb_fail_memory(err, "analysis");
   a->overall.coherence = 1;
   for (size_t o = 0; o < a->frf.ny; o++) {
-    pb_agreement one = a->agreement[o] = pb_agreement_of(&a->frf, a->exact, o);
+    pb_agreement one = a->agreement[o] = pb_agreement_of(&a->frf, a->exact, a->exact_floor, o);
     pb_agreement *all = &a->overall;
     if (one.magnitude_percent >= all->magnitude_percent) all->worst_hz = one.worst_hz;
     all->magnitude_percent = fmax(all->magnitude_percent, one.magnitude_percent);
     all->phase_degree = fmax(all->phase_degree, one.phase_degree);
     all->coherence = fmin(all->coherence, one.coherence);
     all->used += one.used;
+    all->below += one.below;
     all->lines += one.lines;
   }
   return PB_OK;
@@ -160,18 +187,35 @@ size_t pb_fit_channels(const pb_frf *frf, pb_fit_channel *channel, size_t most) 
   return count;
 }
 
-// The fitted root nearest to an exact one, or NaN when it is too far to be meant.
-static pb_pole nearest(const pb_pole *pole, size_t count, pb_pole wanted, double rate) {
-  const pb_pole *p = pb_pole_nearest(pole, count, wanted, rate);
-  double complex s = pb_pole_s(wanted.z, rate);
-  double reach = (0.005 + 0.3 * fabs(wanted.damping)) * cabs(s);
-  if (p && cabs(pb_pole_s(p->z, rate) - s) < reach) return *p;
-  return (pb_pole){.z = NAN, .hz = NAN, .damping = NAN};
-}
-
 static pb_fit_options fit_options(const pb_analysis *a, double floor) {
   return (pb_fit_options){
       .sample_rate = a->model->sample_rate, .weight = PB_FIT_NOISE, .floor = floor};
+}
+
+// Lines of a measurement are evenly spaced.
+static double resolution_of(const pb_frf *frf) {
+  const double *hz = frf->frequency_hz;
+  return frf->nf > 1 ? (hz[frf->nf - 1] - hz[0]) / (double)(frf->nf - 1) : 0;
+}
+
+static pb_status list_modes(pb_analysis *a, const pb_pole_list *exact, const pb_fit *fit,
+                            pb_error *err) {
+  const double rate = a->model->sample_rate;
+  const size_t count = exact->count;
+  pb_pole *measured = malloc((count + 1) * sizeof *measured);
+  size_t *cluster = malloc((count + 1) * sizeof *cluster);
+  a->mode = calloc(count + 1, sizeof *a->mode);
+  pb_status status = measured && cluster && a->mode ? pb_pole_match(exact->item, count, fit->pole,
+                                                                    fit->poles, rate, measured, err)
+                                                    : pb_fail_memory(err, "analysis");
+  a->resolution = resolution_of(&a->frf);
+  if (status == PB_OK)
+    a->clusters = pb_pole_clusters(exact->item, count, rate, a->resolution, cluster);
+  for (size_t k = 0; k < count && status == PB_OK; k++)
+    a->mode[a->modes++] = (pb_mode_row){exact->item[k], measured[k], cluster[k]};
+  free(measured);
+  free(cluster);
+  return status;
 }
 
 static pb_status find_modes(pb_analysis *a, double floor, pb_error *err) {
@@ -183,14 +227,7 @@ static pb_status find_modes(pb_analysis *a, double floor, pb_error *err) {
   size_t channels = pb_fit_channels(&a->frf, channel, FIT_CHANNELS);
   pb_status status = pb_fit_frf(&a->early, channel, channels, &options, &fit, err);
   if (status == PB_OK) status = pb_exact_modes(a->model, f1, f2, &exact, err);
-  if (status == PB_OK) {
-    a->mode = calloc(exact.count + 1, sizeof *a->mode);
-    if (!a->mode) status = pb_fail_memory(err, "analysis");
-  }
-  for (size_t k = 0; k < exact.count && status == PB_OK; k++) {
-    a->mode[a->modes++] = (pb_mode_row){
-        exact.item[k], nearest(fit.pole, fit.poles, exact.item[k], a->model->sample_rate)};
-  }
+  if (status == PB_OK) status = list_modes(a, &exact, &fit, err);
   a->fit_error = fit.error;
   pb_fit_clear(&fit);
   pb_pole_list_clear(&exact);
@@ -202,6 +239,21 @@ static size_t index_of(const size_t *list, size_t count, size_t wanted) {
     if (list[k] == wanted) return k;
   }
   return count;
+}
+
+static pb_status list_zeros(pb_channel_row *row, const pb_exact_zero *exact, size_t count,
+                            const pb_pole_list *fitted, double rate, pb_error *err) {
+  pb_pole *wanted = malloc((count + 1) * sizeof *wanted), *of = malloc((count + 1) * sizeof *of);
+  row->zero = calloc(count + 1, sizeof *row->zero);
+  pb_status status = wanted && of && row->zero ? PB_OK : pb_fail_memory(err, "analysis");
+  for (size_t k = 0; k < count && status == PB_OK; k++) wanted[k] = exact[k].sampled;
+  if (status == PB_OK)
+    status = pb_pole_match(wanted, count, fitted->item, fitted->count, rate, of, err);
+  for (size_t k = 0; k < count && status == PB_OK; k++)
+    row->zero[row->zeros++] = (pb_zero_row){exact[k], of[k]};
+  free(wanted);
+  free(of);
+  return status;
 }
 
 // Zeros and static gain of one channel, from a fit of its own.
@@ -218,14 +270,7 @@ static pb_status look_closely(pb_analysis *a, pb_fit_channel at, double floor, p
   if (status == PB_OK) {
     status = pb_exact_zeros(a->model, row->output, row->input, f1, f2, &exact, &count, err);
   }
-  if (status == PB_OK) {
-    row->zero = calloc(count + 1, sizeof *row->zero);
-    if (!row->zero) status = pb_fail_memory(err, "analysis");
-  }
-  for (size_t k = 0; k < count && status == PB_OK; k++) {
-    row->zero[row->zeros++] = (pb_zero_row){
-        exact[k], nearest(zeros.item, zeros.count, exact[k].sampled, a->model->sample_rate)};
-  }
+  if (status == PB_OK) status = list_zeros(row, exact, count, &zeros, a->model->sample_rate, err);
   // The fit reaches down to 0 Hz where nothing happens below the band.
   double lowest = a->modes > 0 ? a->mode[0].exact.hz : 10 * f1;
   row->dc_measured =
@@ -236,8 +281,8 @@ static pb_status look_closely(pb_analysis *a, pb_fit_channel at, double floor, p
   return status;
 }
 
-// The channels looked at: all when they are few, else each actuator with its own sensor, else the
-// first of each input.
+// The channels looked at: all when they are not too many, else each actuator with its own sensor,
+// else the first of each input.
 static size_t choose_rows(const pb_analysis *a, pb_fit_channel *channel) {
   const pb_experiment_channels *ch = &a->channels;
   size_t count = 0;
@@ -283,7 +328,7 @@ pb_status pb_analyse(const pb_model *model, const pb_experiment_channels *channe
   *out = (pb_analysis){.model = model, .channels = *channels, .frf = *frf};
   *frf = (pb_frf){0};
   pb_status status = pb_exact_responses(model, PB_APPLIED, channels, out->frf.frequency_hz,
-                                        out->frf.nf, &out->exact, err);
+                                        out->frf.nf, &out->exact, &out->exact_floor, err);
   if (status == PB_OK)
     status = pb_responses_advance(model, PB_APPLIED, channels, &out->frf, &out->early, err);
   if (status == PB_OK) status = compare(out, err);

@@ -1,4 +1,5 @@
 // Files of an identification: data and plots.
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -60,6 +61,12 @@ static void pick(const double complex *h, const pb_frf *m, size_t o, size_t i,
   for (size_t f = 0; f < m->nf; f++) out[f] = h[(f * m->ny + o) * m->nu + i];
 }
 
+// What is rounding is not drawn.
+static void leave_out_rounding(const double *floor, const pb_frf *m, size_t o, double complex *h) {
+  for (size_t f = 0; f < m->nf; f++)
+    if (!(cabs(h[f]) > floor[f * m->ny + o])) h[f] = NAN;
+}
+
 static size_t index_of(const size_t *list, size_t count, size_t wanted) {
   size_t k = 0;
   while (k < count && list[k] != wanted) k++;
@@ -76,6 +83,7 @@ static pb_status plot_channel(const identify_result *r, const pb_channel_row *ro
   size_t i = index_of(a->channels.input, a->channels.inputs, row->input);
   pick(a->frf.h, &a->frf, o, i, measured);
   pick(a->exact, &a->frf, o, i, exact);
+  leave_out_rounding(a->exact_floor, &a->frf, o, exact);
   for (size_t f = 0; f < a->frf.nf; f++) coherence[f] = a->frf.coherence[f * a->frf.ny + o];
   char name[300], path[1024], title[300], unit[80];
   snprintf(name, sizeof name, "identify-%s-%s.png", input, output);

@@ -21,6 +21,7 @@ static pb_status print_agreement(const identify_result *r, pb_error *err) {
   pb_table_number_column(&t, "phase", "°", 3);
   pb_table_number_column(&t, "worst at", "Hz", 5);
   pb_table_number_column(&t, "lines used", "%", 4);
+  pb_table_number_column(&t, "below floor", "%", 4);
   pb_table_number_column(&t, "least coherence", NULL, 6);
   for (size_t o = 0; o < a->channels.outputs; o++) {
     const pb_agreement *g = &a->agreement[o];
@@ -29,6 +30,7 @@ static pb_status print_agreement(const identify_result *r, pb_error *err) {
     pb_table_number(&t, g->used ? g->phase_degree : NAN);
     pb_table_number(&t, g->used ? g->worst_hz : NAN);
     pb_table_number(&t, 100.0 * (double)g->used / (double)g->lines);
+    pb_table_number(&t, 100.0 * (double)g->below / (double)g->lines);
     pb_table_number(&t, g->coherence);
   }
   printf("\nLargest difference from the exact sampled response (coherence > 0.99, above the "
@@ -36,6 +38,22 @@ static pb_status print_agreement(const identify_result *r, pb_error *err) {
   pb_status status = pb_table_print(&t, stdout, 2, err);
   pb_table_free(&t);
   return status;
+}
+
+// Equal ones, by symmetry, are told with their number.
+static void print_cluster(const pb_analysis *a, size_t c) {
+  size_t members = 0, shown = 0;
+  for (size_t k = 0; k < a->modes; k++) members += a->mode[k].cluster == c;
+  printf("  cluster of %zu: ", members);
+  for (size_t k = 0; k < a->modes;) {
+    size_t equal = 1;
+    const double hz = a->mode[k].exact.hz;
+    while (k + equal < a->modes && a->mode[k + equal].exact.hz < hz * (1 + 1e-6)) equal++;
+    if (a->mode[k].cluster == c) printf("%s%.7g", shown++ ? ", " : "", hz);
+    if (a->mode[k].cluster == c && equal > 1) printf(" (×%zu)", equal);
+    k += equal;
+  }
+  printf(" Hz, closer than the %g Hz between lines: not told apart one by one\n", a->resolution);
 }
 
 static pb_status print_modes(const identify_result *r, pb_error *err) {
@@ -60,6 +78,7 @@ static pb_status print_modes(const identify_result *r, pb_error *err) {
   printf("\nModes:\n");
   pb_status status = pb_table_print(&t, stdout, 2, err);
   pb_table_free(&t);
+  for (size_t c = 1; c <= a->clusters && status == PB_OK; c++) print_cluster(a, c);
   return status;
 }
 
@@ -96,36 +115,65 @@ static pb_status print_gains(const identify_result *r, pb_error *err) {
   return status;
 }
 
-// "exact" is the zero of the sampled response; that of the continuous plant stands beside it.
+// Where a sampled zero shows a sign that the plant does not have.
+static void print_sign(const pb_analysis *a, const pb_channel_row *row, const pb_zero_row *z) {
+  char name[160];
+  if (!z->exact.sign_differs) return;
+  channel_name(a, row, name, sizeof name);
+  printf("  %s, %.6g Hz: sampling, not the plant, makes the sign of the damping (continuous %+.4g "
+         "%%, sampled %+.4g %%)\n",
+         name, z->exact.continuous.hz, 100 * z->exact.continuous.damping,
+         100 * z->exact.sampled.damping);
+}
+
+static void zero_cells(pb_table *t, const pb_zero_row *z) {
+  pb_table_number(t, z->measured.hz);
+  pb_table_number(t, z->exact.sampled.hz);
+  pb_table_number(t, percent(z->measured.hz, z->exact.sampled.hz));
+  pb_table_number(t, 100 * z->measured.damping);
+  pb_table_number(t, 100 * z->exact.sampled.damping);
+  pb_table_number(t, z->exact.continuous.hz);
+  pb_table_number(t, 100 * z->exact.continuous.damping);
+}
+
+// Measured and "sampled" are zeros of the sampled response; those of the continuous plant stand
+// beside them.
 static pb_status print_zeros(const identify_result *r, pb_error *err) {
   const pb_analysis *a = &r->analysis;
   pb_table t = {0};
+  size_t rows = 0;
   pb_table_text_column(&t, "channel");
   pb_table_number_column(&t, "zero", "Hz", 6);
-  pb_table_number_column(&t, "exact", "Hz", 6);
+  pb_table_number_column(&t, "sampled", "Hz", 6);
   pb_table_number_column(&t, "diff", "%", 2);
   pb_table_number_column(&t, "damping", "%", 4);
-  pb_table_number_column(&t, "exact", "%", 4);
+  pb_table_number_column(&t, "sampled", "%", 4);
   pb_table_number_column(&t, "continuous", "Hz", 6);
-  size_t rows = 0;
+  pb_table_number_column(&t, "continuous", "%", 4);
   for (size_t k = 0; k < a->rows; k++) {
     for (size_t j = 0; j < a->row[k].zeros; j++, rows++) {
-      const pb_zero_row *z = &a->row[k].zero[j];
       char name[160];
       channel_name(a, &a->row[k], name, sizeof name);
       pb_table_text(&t, j == 0 ? name : "");
-      pb_table_number(&t, z->measured.hz);
-      pb_table_number(&t, z->exact.sampled.hz);
-      pb_table_number(&t, percent(z->measured.hz, z->exact.sampled.hz));
-      pb_table_number(&t, 100 * z->measured.damping);
-      pb_table_number(&t, 100 * z->exact.sampled.damping);
-      pb_table_number(&t, z->exact.continuous.hz);
+      zero_cells(&t, &a->row[k].zero[j]);
     }
   }
-  if (rows > 0) printf("\nZeros:\n");
+  if (rows > 0) printf("\nZeros, of the sampled response and of the continuous plant:\n");
   pb_status status = rows > 0 ? pb_table_print(&t, stdout, 2, err) : PB_OK;
   pb_table_free(&t);
+  for (size_t k = 0; k < a->rows && status == PB_OK; k++)
+    for (size_t j = 0; j < a->row[k].zeros; j++) print_sign(a, &a->row[k], &a->row[k].zero[j]);
   return status;
+}
+
+// Channels that were asked for and are not in the tables of zeros and gains, nor drawn.
+static void print_left_out(const pb_analysis *a) {
+  const size_t all = a->channels.inputs * a->channels.outputs;
+  if (a->rows >= all) return;
+  printf(
+      "\nZeros, static gains and plots: %zu of the %zu channels, each actuator with its own sensor "
+      "or the strongest; the files hold all. Fewer --input and --output show the others.\n",
+      a->rows, all);
 }
 
 pb_status identify_print(const identify_result *r, pb_error *err) {
@@ -143,6 +191,7 @@ pb_status identify_print(const identify_result *r, pb_error *err) {
   if (status == PB_OK) status = print_modes(r, err);
   if (status == PB_OK) status = print_zeros(r, err);
   if (status == PB_OK) status = print_gains(r, err);
+  if (status == PB_OK) print_left_out(&r->analysis);
   return status;
 }
 
@@ -187,6 +236,7 @@ static void json_agreement(pb_jsonout *j, const char *key, const char *output,
   pb_jsonout_number(j, "phase_error_degree", g->phase_degree);
   pb_jsonout_number(j, "worst_hz", g->worst_hz);
   pb_jsonout_integer(j, "used", g->used);
+  pb_jsonout_integer(j, "below_floor", g->below);
   pb_jsonout_integer(j, "lines", g->lines);
   pb_jsonout_number(j, "least_coherence", g->coherence);
   pb_jsonout_object_end(j);
@@ -198,6 +248,7 @@ static void json_modes(pb_jsonout *j, const pb_analysis *a) {
     pb_jsonout_object(j, NULL);
     pb_jsonout_pole(j, "exact", &a->mode[k].exact);
     pb_jsonout_pole(j, "measured", &a->mode[k].measured);
+    pb_jsonout_integer(j, "cluster", a->mode[k].cluster);
     pb_jsonout_object_end(j);
   }
   pb_jsonout_array_end(j);
@@ -220,6 +271,7 @@ static void json_channels(pb_jsonout *j, const pb_analysis *a) {
       pb_jsonout_object(j, NULL);
       pb_jsonout_pole(j, "exact", &row->zero[n].exact.sampled);
       pb_jsonout_pole(j, "continuous", &row->zero[n].exact.continuous);
+      pb_jsonout_boolean(j, "sign_by_sampling", row->zero[n].exact.sign_differs);
       pb_jsonout_pole(j, "measured", &row->zero[n].measured);
       pb_jsonout_object_end(j);
     }

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "model/zeros.h"
+#include "model/sampled_roots.h"
 
 pb_status pb_all_poles(const pb_model *model, pb_pole_list *out, pb_error *err) {
   *out = (pb_pole_list){0};
@@ -67,35 +67,6 @@ pb_status pb_settle_seconds(const pb_model *model, double f1, double f2, bool re
   return PB_OK;
 }
 
-// The model with one input and one output only, without electronics, which move no zero; shares all
-// other arrays.
-static pb_model one_channel(const pb_model *m, size_t output, size_t input, double *c, double *d) {
-  pb_model one = *m;
-  one.nu = one.ny = 1;
-  one.input_electronics = one.output_electronics = NULL;
-  one.b = m->b + input * m->nx;
-  one.bd = m->bd + input * m->nx;
-  for (size_t k = 0; k < m->nx; k++) c[k] = m->c[output + k * m->ny];
-  one.c = c;
-  *d = m->d[output + input * m->ny];
-  one.d = d;
-  return one;
-}
-
-static bool newton(const pb_model *one, double complex *z) {
-  for (int it = 0; it < 60; it++) {
-    double complex h, dh;
-    pb_model_evaluate(one, PB_SAMPLED, *z, &h, &dh);
-    double complex step = h / dh;
-    double size = cabs(step), limit = 0.1 * cabs(*z - 1);
-    if (!isfinite(size)) return false;
-    if (size > limit) step *= limit / size;
-    *z -= step;
-    if (size < 1e-13) return true;
-  }
-  return false;
-}
-
 // A zero on a pole: a mode that the channel does not see, or hardly.
 static bool cancels(const pb_pole_list *poles, double complex s, double rate) {
   for (size_t k = 0; k < poles->count; k++) {
@@ -105,33 +76,35 @@ static bool cancels(const pb_pole_list *poles, double complex s, double rate) {
   return false;
 }
 
+static pb_exact_zero zero_of(const pb_sampled_root *r, double rate) {
+  static const pb_pole none = {.z = NAN, .hz = NAN, .damping = NAN};
+  return (pb_exact_zero){
+      .sampled = r->has_sampled ? (pb_pole){r->z, r->sampled_hz, r->sampled_damping} : none,
+      .continuous = {cexp(r->s / rate), r->hz, r->damping},
+      .sign_differs = r->sign_differs};
+}
+
 pb_status pb_exact_zeros(const pb_model *model, size_t output, size_t input, double f1, double f2,
                          pb_exact_zero **zero, size_t *count, pb_error *err) {
   *zero = NULL;
   *count = 0;
-  double complex *s = NULL;
+  pb_sampled_root *root = NULL;
   size_t found = 0;
   pb_pole_list poles = {0};
-  double d, *c = malloc((model->nx + 1) * sizeof *c);
-  pb_status status = c ? pb_model_zeros(model, &input, &output, 1, 1.2 * f2, &s, &found, err)
-                       : pb_fail_memory(err, "zeros");
+  pb_status status =
+      pb_model_sampled_zeros(model, &input, &output, 1, 1.2 * f2, &root, &found, err);
   if (status == PB_OK) status = pb_exact_modes(model, f1, f2, &poles, err);
   if (status == PB_OK) {
     *zero = malloc((found + 1) * sizeof **zero);
     if (!*zero) status = pb_fail_memory(err, "zeros");
   }
-  pb_model one = c ? one_channel(model, output, input, c, &d) : (pb_model){0};
   for (size_t k = 0; k < found && status == PB_OK; k++) {
-    double size = cabs(s[k]), hz = size / (2 * M_PI);
-    double complex z = cexp(s[k] / model->sample_rate);
-    if (cimag(s[k]) < 0 || hz < f1 || hz > f2) continue;
-    if (cancels(&poles, s[k], model->sample_rate) || !newton(&one, &z)) continue;
-    (*zero)[(*count)++] =
-        (pb_exact_zero){pb_pole_from_z(z, model->sample_rate), {z, hz, -creal(s[k]) / size}};
+    if (root[k].hz < f1 || root[k].hz > f2) continue;
+    if (cancels(&poles, root[k].s, model->sample_rate)) continue;
+    (*zero)[(*count)++] = zero_of(&root[k], model->sample_rate);
   }
   pb_pole_list_clear(&poles);
-  free(s);
-  free(c);
+  free(root);
   return status;
 }
 

@@ -12,14 +12,15 @@
 pb_status pb_exact_modes(const pb_model *model, double f1, double f2, pb_pole_list *out,
                          pb_error *err);
 
-// A zero of the sampled response of one channel, and the one of the continuous plant it belongs to.
+// A zero of the continuous plant's channel, and the one of the sampled response that belongs to it
+// (hz NaN: none; model/sampled_roots.h).
 typedef struct pb_exact_zero {
   pb_pole sampled, continuous;
+  bool sign_differs;  // of the damping: sampling makes it, not the plant
 } pb_exact_zero;
 
-// Zeros with f1 ≤ |s|/2π ≤ f2 of the channel, the sampled ones by Newton's method on the exact
-// response from the continuous ones. Zeros that cancel a pole (a mode the channel does not see) are
-// left out. *zero [*count] is the caller's. [init]
+// Zeros with f1 ≤ |s|/2π ≤ f2 of the channel. Zeros that cancel a pole (a mode the channel does not
+// see) are left out. *zero [*count] is the caller's. [init]
 pb_status pb_exact_zeros(const pb_model *model, size_t output, size_t input, double f1, double f2,
                          pb_exact_zero **zero, size_t *count, pb_error *err);
 

@@ -38,11 +38,13 @@ static pb_status choose_gain(iff_result *r, pb_error *err) {
 static pb_status check_stability(iff_result *r, pb_error *err) {
   pb_status status = pb_loop_solver_stable(r->solver, r->law.gain, &r->stable, &r->worst, err);
   if (status != PB_OK || r->stable || r->options->force) return status;
+  char pole[96];
+  pb_pole_format(r->worst, r->model->sample_rate, pole, sizeof pole);
   return pb_fail(
       err, PB_ERR_STATE, "gain",
-      "with %g the loop is predicted to be unstable: a pole at %.6g Hz with damping %.3g %% "
-      "(--force closes it all the same)",
-      r->law.gain, r->worst.hz, 100 * r->worst.damping);
+      "with %g the loop is predicted to be unstable: a pole at %s (--force closes it all "
+      "the same)",
+      r->law.gain, pole);
 }
 
 // 0, then even ratios from a hundredth of the gain to ten times it.
@@ -104,6 +106,7 @@ pb_status iff_prepare(const iff_options *o, const pb_bench *bench, iff_result *r
 void iff_measurement_clear(iff_measurement *m) {
   pb_frf_clear(&m->frf);
   free(m->expected);
+  free(m->floor);
   pb_fit_clear(&m->fit);
   *m = (iff_measurement){0};
 }

@@ -55,15 +55,14 @@ typedef struct iff_mode {
 typedef struct iff_measurement {
   pb_frf frf;                // nf == 0: not measured
   double complex *expected;  // [nf][outputs][inputs]
+  double *floor;             // [nf][outputs] below which an expected response is rounding
   pb_agreement agreement;    // over all outputs
   pb_fit fit;
   pb_run_report report;
 } iff_measurement;
 
-// Fills the agreement of a measured response with the expected one, over the outputs (of the
-// model's list) that the inputs move. [any]
-void iff_compare(const pb_signal *output, const pb_experiment_channels *channels,
-                 iff_measurement *measurement);
+// Fills the agreement of a measured response with the expected one, over all its outputs. [any]
+void iff_compare(iff_measurement *measurement);
 void iff_measurement_clear(iff_measurement *measurement);
 
 typedef struct iff_result {

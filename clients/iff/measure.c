@@ -7,6 +7,8 @@
 #include "iff_tool.h"
 #include "plant/plant.h"
 
+#include "control/pole_match.h"
+
 enum { FIT_CHANNELS = 8 };
 
 static pb_status settle_open(const iff_result *r, bool removable, double *seconds, pb_error *err) {
@@ -53,9 +55,12 @@ static pb_status predict(const iff_result *r, iff_measurement *m, pb_error *err)
   size_t all = r->model->ny * r->model->nu, some = ch->outputs * ch->inputs;
   double complex *h = malloc(all * sizeof *h);
   m->expected = malloc(m->frf.nf * some * sizeof *m->expected);
-  pb_status status = h && m->expected ? PB_OK : pb_fail_memory(err, "prediction");
+  m->floor = malloc(m->frf.nf * ch->outputs * sizeof *m->floor);
+  pb_status status = h && m->expected && m->floor ? PB_OK : pb_fail_memory(err, "prediction");
   for (size_t f = 0; f < m->frf.nf && status == PB_OK; f++) {
     status = pb_loop_frf(&r->loop, r->law.gain, &m->frf.frequency_hz[f], 1, h, err);
+    if (status == PB_OK)
+      pb_response_floor(h, r->model->nu, ch->output, ch->outputs, m->floor + f * ch->outputs);
     for (size_t k = 0; k < some && status == PB_OK; k++) {
       m->expected[f * some + k] =
           h[ch->output[k / ch->inputs] * r->model->nu + ch->input[k % ch->inputs]];
@@ -65,40 +70,18 @@ static pb_status predict(const iff_result *r, iff_measurement *m, pb_error *err)
   return status;
 }
 
-// The largest expected response of each output.
-static void largest_expected(const iff_measurement *m, double largest[PB_MAX_OUTPUTS]) {
-  for (size_t o = 0; o < m->frf.ny; o++) largest[o] = 0;
-  for (size_t k = 0; k < m->frf.nf * m->frf.ny * m->frf.nu; k++) {
-    size_t o = k / m->frf.nu % m->frf.ny;
-    largest[o] = fmax(largest[o], cabs(m->expected[k]));
-  }
-}
-
-// An output that no driven input moves, by symmetry say, beside others of its unit: its response is
-// rounding.
-static bool negligible(const pb_signal *output, const pb_experiment_channels *ch,
-                       const double *largest, size_t o) {
-  double most = 0;
-  for (size_t k = 0; k < ch->outputs; k++) {
-    if (strcmp(output[ch->output[k]].unit, output[ch->output[o]].unit) == 0)
-      most = fmax(most, largest[k]);
-  }
-  return largest[o] < 1e-6 * most;
-}
-
-void iff_compare(const pb_signal *output, const pb_experiment_channels *ch, iff_measurement *m) {
-  double largest[PB_MAX_OUTPUTS];
-  largest_expected(m, largest);
-  m->agreement.coherence = 1;
+void iff_compare(iff_measurement *m) {
+  m->agreement = (pb_agreement){.coherence = 1};
   for (size_t o = 0; o < m->frf.ny; o++) {
-    if (negligible(output, ch, largest, o)) continue;
-    pb_agreement one = pb_agreement_of(&m->frf, m->expected, o), *all = &m->agreement;
+    pb_agreement one = pb_agreement_of(&m->frf, m->expected, m->floor, o), *all = &m->agreement;
+    all->below += one.below;
+    all->lines += one.lines;
+    if (one.used == 0) continue;
     if (one.magnitude_percent >= all->magnitude_percent) all->worst_hz = one.worst_hz;
     all->magnitude_percent = fmax(all->magnitude_percent, one.magnitude_percent);
     all->phase_degree = fmax(all->phase_degree, one.phase_degree);
     all->coherence = fmin(all->coherence, one.coherence);
     all->used += one.used;
-    all->lines += one.lines;
   }
 }
 
@@ -108,10 +91,10 @@ static pb_status evaluate(const iff_result *r, pb_experiment *experiment, bool c
   if (status == PB_OK) {
     status = closed ? predict(r, m, err)
                     : pb_exact_responses(r->model, PB_SAMPLED, &r->channels, m->frf.frequency_hz,
-                                         m->frf.nf, &m->expected, err);
+                                         m->frf.nf, &m->expected, &m->floor, err);
   }
   if (status != PB_OK) return status;
-  iff_compare(r->model->output, &r->channels, m);
+  iff_compare(m);
   pb_fit_channel channel[FIT_CHANNELS];
   size_t channels = pb_fit_channels(&m->frf, channel, FIT_CHANNELS);
   pb_fit_options options = {.sample_rate = r->model->sample_rate,
@@ -124,15 +107,21 @@ static pb_status evaluate(const iff_result *r, pb_experiment *experiment, bool c
   return status;
 }
 
-// The fitted pole nearest to a predicted one, unless it is too far to be meant: a mode that the
-// loops do not reach does not show in the measurement.
-static pb_pole found(const pb_fit *fit, pb_pole wanted, double rate) {
-  const pb_pole unknown = {.z = NAN, .hz = NAN, .damping = NAN};
-  if (isnan(wanted.hz)) return unknown;
-  const pb_pole *p = pb_pole_nearest(fit->pole, fit->poles, wanted, rate);
-  double complex s = pb_pole_s(wanted.z, rate);
-  double reach = (0.005 + 0.3 * fabs(wanted.damping)) * cabs(s);
-  return p && cabs(pb_pole_s(p->z, rate) - s) < reach ? *p : unknown;
+// The fitted poles that are meant by these members of the modes: a mode that the loops do not reach
+// does not show in the measurement.
+static pb_status find(iff_result *r, const pb_fit *fit, bool closed, pb_error *err) {
+  pb_pole *wanted = malloc((r->modes + 1) * sizeof *wanted);
+  pb_pole *of = malloc((r->modes + 1) * sizeof *of);
+  pb_status status = wanted && of ? PB_OK : pb_fail_memory(err, "modes");
+  for (size_t k = 0; k < r->modes && status == PB_OK; k++)
+    wanted[k] = closed ? r->mode[k].closed_predicted : r->mode[k].open_exact;
+  if (status == PB_OK)
+    status = pb_pole_match(wanted, r->modes, fit->pole, fit->poles, r->model->sample_rate, of, err);
+  for (size_t k = 0; k < r->modes && status == PB_OK; k++)
+    *(closed ? &r->mode[k].closed_measured : &r->mode[k].open_measured) = of[k];
+  free(wanted);
+  free(of);
+  return status;
 }
 
 static pb_status run_both(iff_result *r, pb_bench *bench, pb_experiment *open,
@@ -156,12 +145,8 @@ pb_status iff_measure(iff_result *r, pb_bench *bench, pb_error *err) {
   if (closed) pb_bench_tell_trouble(closed);
   if (status == PB_OK && open) status = evaluate(r, open, false, &r->open, err);
   if (status == PB_OK) status = evaluate(r, closed, true, &r->closed, err);
-  double rate = r->model->sample_rate;
-  for (size_t k = 0; k < r->modes && status == PB_OK; k++) {
-    iff_mode *m = &r->mode[k];
-    if (open) m->open_measured = found(&r->open.fit, m->open_exact, rate);
-    m->closed_measured = found(&r->closed.fit, m->closed_predicted, rate);
-  }
+  if (status == PB_OK && open) status = find(r, &r->open.fit, false, err);
+  if (status == PB_OK) status = find(r, &r->closed.fit, true, err);
   pb_experiment_free(open);
   pb_experiment_free(closed);
   return status;

@@ -35,13 +35,24 @@ static void print_head(const iff_result *r) {
          (double)samples / seconds);
 }
 
+static void print_missing(const iff_result *r) {
+  size_t missing = 0;
+  for (size_t k = 0; k < r->modes; k++) missing += isnan(r->mode[k].closed_measured.hz);
+  if (missing > 0)
+    printf(
+        "  – : %zu modes without a measured pole of their own: equal to another one, or not seen "
+        "by the loops\n",
+        missing);
+}
+
 static pb_status print_modes(const iff_result *r, pb_error *err) {
   bool open = r->open.frf.nf > 0, closed = r->closed.frf.nf > 0;
   pb_table t = {0};
   pb_table_number_column(&t, "open", "Hz", 6);
   pb_table_number_column(&t, "exact damping", "%", 4);
   if (open) pb_table_number_column(&t, "measured", "%", 4);
-  pb_table_number_column(&t, "closed", "Hz", 6);
+  pb_table_number_column(&t, "closed |s|/2π", "Hz", 6);
+  pb_table_number_column(&t, "oscillates at", "Hz", 6);
   if (closed) pb_table_number_column(&t, "measured", "Hz", 6);
   pb_table_number_column(&t, "predicted damping", "%", 4);
   if (closed) pb_table_number_column(&t, "measured", "%", 4);
@@ -52,6 +63,7 @@ static pb_status print_modes(const iff_result *r, pb_error *err) {
     pb_table_number(&t, 100 * m->open_exact.damping);
     if (open) pb_table_number(&t, 100 * m->open_measured.damping);
     pb_table_number(&t, m->closed_predicted.hz);
+    pb_table_number(&t, pb_pole_damped_hz(m->closed_predicted));
     if (closed) pb_table_number(&t, m->closed_measured.hz);
     pb_table_number(&t, 100 * m->closed_predicted.damping);
     if (!closed) continue;
@@ -60,6 +72,7 @@ static pb_status print_modes(const iff_result *r, pb_error *err) {
   }
   printf("\nModes, open loop and closed:\n");
   pb_status status = pb_table_print(&t, stdout, 2, err);
+  if (closed && status == PB_OK) print_missing(r);
   pb_table_free(&t);
   return status;
 }
@@ -67,10 +80,18 @@ static pb_status print_modes(const iff_result *r, pb_error *err) {
 static void print_agreement(const char *what, const iff_measurement *m) {
   if (m->frf.nf == 0) return;
   const pb_agreement *a = &m->agreement;
-  printf("%s plant: within %.3g %% and %.3g° of the prediction (worst at %g Hz, %.1f %% of the "
-         "lines)\n",
-         what, a->magnitude_percent, a->phase_degree, a->worst_hz,
-         100.0 * (double)a->used / (double)a->lines);
+  if (a->used == 0)
+    printf("%s plant: nothing to compare, no line is above the noise and the floor\n", what);
+  else
+    printf("%s plant: within %.3g %% and %.3g° of the prediction (worst at %g Hz, %.1f %% of the "
+           "lines)\n",
+           what, a->magnitude_percent, a->phase_degree, a->worst_hz,
+           100.0 * (double)a->used / (double)a->lines);
+  if (a->below > 0)
+    printf(
+        "  %.1f %% of the lines are below the floor: responses that are rounding (symmetry), not "
+        "compared\n",
+        100.0 * (double)a->below / (double)a->lines);
 }
 
 pb_status iff_print(const iff_result *r, pb_error *err) {
@@ -85,8 +106,9 @@ pb_status iff_print(const iff_result *r, pb_error *err) {
   print_agreement("Undamped", &r->open);
   print_agreement("Damped", &r->closed);
   if (!r->stable) {
-    printf("The loop is predicted to be unstable: a pole at %g Hz, damping %.3g %%\n", r->worst.hz,
-           100 * r->worst.damping);
+    char pole[96];
+    pb_pole_format(r->worst, r->model->sample_rate, pole, sizeof pole);
+    printf("The loop is predicted to be unstable: a pole at %s\n", pole);
   }
   return status;
 }
@@ -136,6 +158,7 @@ static void json_measurement(pb_jsonout *j, const char *key, const iff_measureme
   pb_jsonout_number(j, "phase_error_degree", m->agreement.phase_degree);
   pb_jsonout_number(j, "worst_hz", m->agreement.worst_hz);
   pb_jsonout_integer(j, "used", m->agreement.used);
+  pb_jsonout_integer(j, "below_floor", m->agreement.below);
   pb_jsonout_integer(j, "lines", m->agreement.lines);
   pb_jsonout_number(j, "least_coherence", m->agreement.coherence);
   pb_jsonout_number(j, "fit_error", m->fit.error);

@@ -138,7 +138,7 @@ static void read_row(const pb_bench *bench, const pb_analysis *a, size_t sensor,
   row->revision = bench->description->revision;
   row->states = bench->model->nx;
   row->agreement = a->overall;
-  row->mode = a->modes ? a->mode[0] : (pb_mode_row){unknown, unknown};
+  row->mode = a->modes ? a->mode[0] : (pb_mode_row){unknown, unknown, 0};
   row->zero = (pb_zero_row){.exact = {unknown, unknown}, .measured = unknown};
   for (size_t k = 0; k < a->rows; k++)
     if (a->row[k].output == sensor && a->row[k].zeros > 0) row->zero = a->row[k].zero[0];

@@ -24,6 +24,14 @@ pb_pole pb_pole_from_z(double complex z, double sample_rate);
 // s = ln(z)·f_s in rad/s. [any]
 double complex pb_pole_s(double complex z, double sample_rate);
 
+// "15.9 Hz with damping -0.3 %"; where that says little (a real pole, or one so far from the circle
+// that |s|/2π is beyond half the sample rate): "z = -1.93". [any]
+void pb_pole_format(pb_pole pole, double sample_rate, char *text, size_t size);
+
+// The frequency at which it oscillates, |Im s| / 2π; NaN for one that does not (|damping| ≥ 1).
+// [any]
+double pb_pole_damped_hz(pb_pole pole);
+
 // Ascending frequency. [any]
 void pb_pole_sort(pb_pole *pole, size_t count);
 

@@ -102,6 +102,18 @@ static void test_repeat(void **state) {
   for (int i = 0; i < 3; i++) free(samples[i]);
 }
 
+// Two modes of the same frequency, by symmetry, show one pole in a measurement.
+static bool has_measured_twin(const cJSON *modes, const cJSON *mode) {
+  const double hz = number(pb_json_member(mode, "closed_predicted"), "hz");
+  const cJSON *other;
+  cJSON_ArrayForEach(other, modes) {
+    const cJSON *damping = pb_json_member(pb_json_member(other, "closed_measured"), "damping");
+    const double near = number(pb_json_member(other, "closed_predicted"), "hz") / hz - 1;
+    if (other != mode && cJSON_IsNumber(damping) && fabs(near) < 1e-3) return true;
+  }
+  return false;
+}
+
 // The damping that the closed loop shows is the predicted one, to 5 % of it, mode by mode.
 static void test_iff(void **state) {
   (void)state;
@@ -109,10 +121,15 @@ static void test_iff(void **state) {
                                           "--resolution", "1",   "--no-open-loop", NULL};
   cJSON *report = run(PB_BIN "/plantbus-iff", arguments);
   const cJSON *mode;
-  size_t compared = 0;
+  size_t compared = 0, twins = 0;
   cJSON_ArrayForEach(mode, pb_json_member(report, "modes")) {
     const cJSON *predicted = pb_json_member(mode, "closed_predicted");
     const cJSON *measured = pb_json_member(mode, "closed_measured");
+    if (cJSON_IsNull(pb_json_member(measured, "damping"))) {
+      assert_true(has_measured_twin(pb_json_member(report, "modes"), mode));
+      twins++;
+      continue;
+    }
     double a = number(measured, "damping"), b = number(predicted, "damping");
     double before = number(pb_json_member(mode, "open_exact"), "damping");
     print_message("%.4g Hz: damping %.5f before, predicted %.5f, measured %.5f\n",
@@ -121,8 +138,9 @@ static void test_iff(void **state) {
     assert_true(b > 5 * before);
     compared++;
   }
-  assert_true(compared > 0);
-  assert_true(compared == 1 || compared == 6);  // the bench's mode, or the six of a suspension
+  // The bench's mode, or the six of a suspension, with at most a pair along x and y, and one about.
+  assert_true(compared == 1 || compared + twins == 6);
+  assert_true(twins <= 2);
   cJSON_Delete(report);
 }
 
