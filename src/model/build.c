@@ -290,13 +290,14 @@ typedef struct cut {
   const pb_model *m;
   const rank *order;
   size_t direct;         // leading inputs whose columns of d count
+  bool pairs;            // with residual pairs
   size_t kept, fast;     // blocks
   size_t nx, values;     // of the blocks that are kept
   pb_residual residual;  // of the others
 } cut;
 
 static pb_status cut_make(cut *c, double hz, pb_error *err) {
-  pb_status st = pb_residual_open(c->m, c->direct, two_pi * hz, &c->residual, err);
+  pb_status st = pb_residual_open(c->m, c->pairs ? c->direct : 0, two_pi * hz, &c->residual, err);
   for (size_t k = 0; k < c->m->blocks && !st; k++) {
     const pb_model_part p = part_of(c->m, c->order[k].block);
     if (c->order[k].fast)
@@ -355,11 +356,11 @@ static pb_status settle_like(const pb_model *m, size_t direct, pb_model *copy, p
   return st;
 }
 
-// The blocks of m in this order, those above hz (0: none) gone into the first columns of d and into
-// residual pairs.
-static pb_status rebuild(const pb_model *m, const rank *order, double hz, size_t direct, bool steps,
-                         pb_model **out, pb_error *err) {
-  cut c = {.m = m, .order = order, .direct = direct};
+// The blocks of m in this order, those above hz (0: none) gone into the first columns of d and,
+// where these are wanted, into residual pairs.
+static pb_status rebuild(const pb_model *m, const rank *order, double hz, size_t direct, bool pairs,
+                         bool steps, pb_model **out, pb_error *err) {
+  cut c = {.m = m, .order = order, .direct = direct, .pairs = pairs};
   pb_model *copy = NULL;
   pb_status st = cut_make(&c, hz, err);
   if (!st) copy = pb_model_allocate(c.nx, m->nu, m->ny, m->modes, c.kept, c.values);
@@ -422,7 +423,7 @@ pb_status pb_model_builder_close(pb_model_builder *b, double max_frequency, pb_m
       b->model = NULL;
     }
   } else {
-    st = rebuild(b->model, order, max_frequency, b->direct, !b->plain, out, err);
+    st = rebuild(b->model, order, max_frequency, b->direct, true, !b->plain, out, err);
   }
   free(order);
   pb_model_builder_discard(b);
@@ -434,7 +435,7 @@ pb_status pb_model_truncate(const pb_model *model, double hz, pb_model **out, pb
   if (!(hz > 0)) return pb_fail(err, PB_ERR_ARGUMENT, "max_frequency", "expected a number > 0");
   rank *order = rank_blocks(model, hz);
   if (!order) return pb_fail_memory(err, "max_frequency");
-  pb_status st = rebuild(model, order, hz, model->nu, true, out, err);
+  pb_status st = rebuild(model, order, hz, model->nu, false, true, out, err);
   free(order);
   return st;
 }

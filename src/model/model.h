@@ -153,7 +153,8 @@ pb_status pb_model_poles(const pb_model *model, pb_time_base base, double comple
 pb_status pb_model_dc(const pb_model *model, double *gain, pb_error *err);
 
 // A copy without the blocks whose |λ| exceeds 2π·hz; their static contribution goes into D. The
-// electronics stay. [init]
+// electronics stay. Poles are among those of the model: unlike with the plant file's max_frequency
+// there are no residual pairs, and velocities and accelerations lack what these would keep. [init]
 pb_status pb_model_truncate(const pb_model *model, double hz, pb_model **out, pb_error *err);
 
 // The whole compiled model as one array of doubles (names excluded), so that a bus can carry it to

@@ -227,12 +227,28 @@ static void test_truncated_and_sampled(void **state) {
   drop(&cut), drop(&whole);
 }
 
+// A model that is cut for its poles has no others.
+static void test_cut_has_no_poles_of_its_own(void **state) {
+  (void)state;
+  subject s = make("", HELD);
+  pb_model *cut;
+  double complex of[132], own[132];
+  REQUIRE(pb_model_truncate(s.model, 2000, &cut, &err));
+  assert_true(cut->nx > 0 && cut->nx < s.model->nx && s.model->nx <= 132);
+  REQUIRE(pb_model_poles(s.model, PB_CONTINUOUS, of, &err));
+  REQUIRE(pb_model_poles(cut, PB_CONTINUOUS, own, &err));
+  for (size_t k = 0; k < cut->nx; k++) assert_true(own[k] == of[k]);
+  pb_model_free(cut);
+  drop(&s);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_digits_at_low_frequency),
       cmocka_unit_test(test_rest),
       cmocka_unit_test(test_truncated),
       cmocka_unit_test(test_truncated_and_sampled),
+      cmocka_unit_test(test_cut_has_no_poles_of_its_own),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
