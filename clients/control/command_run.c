@@ -114,6 +114,7 @@ static pb_status run(const control_options *o, pb_error *err) {
   run_result r = {.design = &d, .bench = &plant.bench};
   status = control_design_make(o, &plant, &d, err);
   if (status == PB_OK) status = check(&d, err);
+  if (status == PB_OK) status = control_judge(&d, &r.judgement, err);
   if (status == PB_OK) {
     iff_experiment_defaults(&o->iff, d.model, &r.experiment);
     r.experiment.limit = o->iff.excite.experiment.limit;
@@ -121,6 +122,7 @@ static pb_status run(const control_options *o, pb_error *err) {
   }
   if (status == PB_OK) status = present(&r, err);
   result_clear(&r);
+  control_judgement_clear(&r.judgement);
   control_design_clear(&d);
   control_plant_close(&plant);
   return status;

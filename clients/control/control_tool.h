@@ -138,6 +138,19 @@ typedef struct control_judgement {
   double complex *transmission[STAGES];  // [nf][motions][disturbances]
 } control_judgement;
 
+// Why a loop does not cross where it was asked to: from the bandwidth on no loop gain exceeds 1,
+// and a mode's peak up there takes the gain.
+typedef struct control_limit {
+  bool missed;      // the crossover is not within 10 % of the bandwidth
+  double hz;        // where the loop touches 1; NaN where nothing is missed
+  double short_db;  // so much gain is missing at the bandwidth
+  pb_pole mode;     // nearest to it, of the plant or with IFF
+} control_limit;
+
+// *out [n] is the caller's (free). [init] PB_ERR_MEMORY, and as pb_loop_solver_poles.
+pb_status control_limits_find(const control_design *design, const control_judgement *j,
+                              control_limit **out, pb_error *err);
+
 pb_status control_judge(const control_design *design, control_judgement *out, pb_error *err);
 void control_judgement_clear(control_judgement *judgement);
 
@@ -146,6 +159,13 @@ void control_judgement_clear(control_judgement *judgement);
 pb_status control_print(const control_design *design, const control_judgement *j, pb_error *err);
 pb_status control_print_json(const control_design *design, const control_judgement *j,
                              pb_error *err);
+
+// Margins of the loops one by one and together, delay margins and what limits the bandwidth; of an
+// unstable loop none. Warns on stderr where a bandwidth is not reached.
+pb_status control_print_margins(const control_design *design, const control_judgement *j,
+                                pb_error *err);
+void control_json_margins(pb_jsonout *out, const control_design *design,
+                          const control_judgement *j);
 
 // The members that say what was designed, into an open object.
 void control_json_design(pb_jsonout *out, const control_design *design);

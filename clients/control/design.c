@@ -8,8 +8,8 @@
 const char *const control_stage_name[STAGES] = {"undamped", "IFF", "HAC-LAC"};
 const char *const control_stage_key[STAGES] = {"undamped", "iff", "hac"};
 
-static pb_hac_shape shape_of(const control_options *o) {
-  pb_hac_shape s = pb_hac_shape_default(o->bandwidth_hz);
+static pb_hac_shape shape_of(const control_options *o, double sample_rate) {
+  pb_hac_shape s = pb_hac_shape_default(o->bandwidth_hz, sample_rate);
   if (o->lead >= 0) s.lead = o->lead;
   if (o->integrator_hz >= 0) s.integrator_hz = o->integrator_hz;
   if (o->lowpass_hz >= 0) s.lowpass_hz = o->lowpass_hz;
@@ -109,7 +109,7 @@ pb_status control_design_make(const control_options *options, const control_plan
                         .plant = plant,
                         .model = plant->bench.model,
                         .damped = !options->no_iff,
-                        .shape = shape_of(options)};
+                        .shape = shape_of(options, plant->bench.model->sample_rate)};
   choose_delays(d);
   pb_status status = pb_hac_shape_discrete(&d->shape, d->model->sample_rate, &d->shape_lti, err);
   if (status == PB_OK) status = control_choose_channels(d, err);

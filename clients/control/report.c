@@ -1,5 +1,7 @@
 // The report of a design: tables.
+#include <errno.h>
 #include <math.h>
+#include <stdlib.h>
 
 #include "control_tool.h"
 #include "table.h"
@@ -19,7 +21,7 @@ static void print_shape(const control_design *d) {
            s->bandwidth_hz * root);
   }
   if (s->lowpass_hz > 0) printf(" · 2π·%g/(s + 2π·%g)", s->lowpass_hz, s->lowpass_hz);
-  printf(", crossover at %g Hz, delay %u\n", s->bandwidth_hz, d->hac_delay);
+  printf(", crossover asked for: %g Hz, delay %u\n", s->bandwidth_hz, d->hac_delay);
 }
 
 void control_print_design(const control_design *d) {
@@ -49,6 +51,8 @@ static void margin_columns(pb_table *t) {
   pb_table_number_column(t, "crossover", "Hz", 5);
   pb_table_number_column(t, "phase margin", "°", 4);
   pb_table_number_column(t, "at", "Hz", 5);
+  pb_table_number_column(t, "delay margin", "ms", 4);
+  pb_table_number_column(t, "at", "Hz", 5);
   pb_table_number_column(t, "gain up", "×", 4);
   pb_table_number_column(t, "at", "Hz", 5);
   pb_table_number_column(t, "gain down", "×", 4);
@@ -61,6 +65,8 @@ static void margin_cells(pb_table *t, const pb_margins *m) {
   pb_table_number(t, m->crossover_hz);
   pb_table_number(t, m->phase_degree);
   pb_table_number(t, m->phase_hz);
+  pb_table_number(t, 1e3 * m->delay);
+  pb_table_number(t, m->delay_hz);
   pb_table_number(t, m->gain_up);
   pb_table_number(t, m->gain_up_hz);
   pb_table_number(t, m->gain_down > 0 ? m->gain_down : NAN);
@@ -106,6 +112,49 @@ static void print_mimo(const control_judgement *j) {
   printf("\nSensitivity at the metrology: largest σ(S) %.4g at %.5g Hz", m->s_peak, m->s_peak_hz);
   if (m->s_low_hz > 0) printf(", below −3 dB up to %.4g Hz", m->s_low_hz);
   printf("; largest σ(T) %.4g at %.5g Hz\n", m->t_peak, m->t_peak_hz);
+}
+
+// The delay that all loops stand together, in samples too: a controller that answers so much later
+// makes them unstable.
+static void print_delay(const control_design *d, const control_judgement *j) {
+  const pb_margins *least = d->n == 1 ? &j->margins[0] : &j->mimo.margins[0];
+  for (size_t i = 1; i < d->n; i++)
+    if (j->mimo.margins[i].delay < least->delay) least = &j->mimo.margins[i];
+  if (isinf(least->delay)) return;
+  printf("Delay margin, all loops: %.4g ms, %.3g samples, by the crossing at %.5g Hz\n",
+         1e3 * least->delay, least->delay * d->model->sample_rate, least->delay_hz);
+}
+
+static void print_limits(const control_design *d, const control_judgement *j,
+                         const control_limit *limit) {
+  for (size_t i = 0; i < d->n; i++) {
+    const control_limit *l = &limit[i];
+    if (!l->missed) continue;
+    fprintf(
+        stderr,
+        "%s: warning: loop %s crosses at %.4g Hz, not at the %g Hz asked for, where %.3g dB are "
+        "missing: the mode at %.5g Hz (damping %.3g %%) takes them, its peak touches 1 at %.5g "
+        "Hz. Damp it (IFF gain), or ask for less bandwidth or a lower --lowpass\n",
+        program_invocation_short_name, control_loop_name(d, i), j->margins[i].crossover_hz,
+        d->shape.bandwidth_hz, l->short_db, l->mode.hz, 100 * l->mode.damping, l->hz);
+  }
+}
+
+pb_status control_print_margins(const control_design *d, const control_judgement *j,
+                                pb_error *err) {
+  control_limit *limit;
+  if (!d->stable) {
+    printf("\nMargins are distances from instability: an unstable loop has none\n");
+    return PB_OK;
+  }
+  pb_status status = control_limits_find(d, j, &limit, err);
+  if (status == PB_OK) status = print_loops(d, j, err);
+  if (status == PB_OK && d->n > 1) status = print_loci(d, j, err);
+  if (status == PB_OK) print_delay(d, j);
+  if (status == PB_OK) print_mimo(j);
+  if (status == PB_OK) print_limits(d, j, limit);
+  free(limit);
+  return status;
 }
 
 static void print_proof(const control_design *d) {
@@ -184,9 +233,7 @@ static pb_status print_transmission(const control_design *d, const control_judge
 
 pb_status control_print(const control_design *d, const control_judgement *j, pb_error *err) {
   control_print_design(d);
-  pb_status status = print_loops(d, j, err);
-  if (status == PB_OK && d->n > 1) status = print_loci(d, j, err);
-  if (status == PB_OK) print_mimo(j);
+  pb_status status = control_print_margins(d, j, err);
   if (status == PB_OK) print_proof(d);
   if (status == PB_OK) status = print_modes(d, err);
   if (status == PB_OK) status = print_transmission(d, j, err);

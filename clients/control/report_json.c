@@ -67,6 +67,8 @@ static void json_margins(pb_jsonout *o, const pb_margins *m) {
   pb_jsonout_number(o, "crossover_hz", m->crossover_hz);
   pb_jsonout_number(o, "phase_margin_degree", m->phase_degree);
   pb_jsonout_number(o, "phase_margin_hz", m->phase_hz);
+  pb_jsonout_number(o, "delay_margin", m->delay);
+  pb_jsonout_number(o, "delay_margin_hz", m->delay_hz);
   pb_jsonout_number(o, "gain_up", m->gain_up);
   pb_jsonout_number(o, "gain_up_hz", m->gain_up_hz);
   pb_jsonout_number(o, "gain_down", m->gain_down);
@@ -75,29 +77,35 @@ static void json_margins(pb_jsonout *o, const pb_margins *m) {
   pb_jsonout_number(o, "modulus_hz", m->modulus_hz);
 }
 
-static void json_loops(pb_jsonout *o, const control_design *d, const control_judgement *j) {
+// Of an unstable loop none: they are null.
+static const pb_margins *judged(const control_design *d, const pb_margins *m) {
+  static const pb_margins none = {NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
+  return d->stable ? m : &none;
+}
+
+void control_json_margins(pb_jsonout *o, const control_design *d, const control_judgement *j) {
   pb_jsonout_array(o, "loops");
   for (size_t i = 0; i < d->n; i++) {
     pb_jsonout_object(o, NULL);
     pb_jsonout_text(o, "name", control_loop_name(d, i));
     pb_jsonout_number(o, "gain", d->gain[i]);
-    json_margins(o, &j->margins[i]);
+    json_margins(o, judged(d, &j->margins[i]));
     pb_jsonout_object_end(o);
   }
   pb_jsonout_array_end(o);
   pb_jsonout_array(o, "loci");
   for (size_t i = 0; i < d->n; i++) {
     pb_jsonout_object(o, NULL);
-    json_margins(o, &j->mimo.margins[i]);
+    json_margins(o, judged(d, &j->mimo.margins[i]));
     pb_jsonout_object_end(o);
   }
   pb_jsonout_array_end(o);
   pb_jsonout_object(o, "sensitivity");
-  pb_jsonout_number(o, "peak", j->mimo.s_peak);
-  pb_jsonout_number(o, "peak_hz", j->mimo.s_peak_hz);
-  pb_jsonout_number(o, "below_3db_hz", j->mimo.s_low_hz);
-  pb_jsonout_number(o, "complementary_peak", j->mimo.t_peak);
-  pb_jsonout_number(o, "complementary_peak_hz", j->mimo.t_peak_hz);
+  pb_jsonout_number(o, "peak", d->stable ? j->mimo.s_peak : NAN);
+  pb_jsonout_number(o, "peak_hz", d->stable ? j->mimo.s_peak_hz : NAN);
+  pb_jsonout_number(o, "below_3db_hz", d->stable ? j->mimo.s_low_hz : NAN);
+  pb_jsonout_number(o, "complementary_peak", d->stable ? j->mimo.t_peak : NAN);
+  pb_jsonout_number(o, "complementary_peak_hz", d->stable ? j->mimo.t_peak_hz : NAN);
   pb_jsonout_object_end(o);
 }
 
@@ -144,7 +152,7 @@ pb_status control_print_json(const control_design *d, const control_judgement *j
   pb_jsonout_begin(&o, stdout);
   pb_jsonout_object(&o, NULL);
   control_json_design(&o, d);
-  json_loops(&o, d, j);
+  control_json_margins(&o, d, j);
   json_modes(&o, d);
   json_transmission(&o, d, j);
   pb_jsonout_object_end(&o);

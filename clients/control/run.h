@@ -17,6 +17,7 @@ typedef struct run_stage {
 
 typedef struct run_result {
   const control_design *design;
+  control_judgement judgement;
   pb_bench *bench;
   pb_experiment_options experiment;
   pb_experiment_channels channels;  // disturbances, all outputs

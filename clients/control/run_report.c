@@ -75,7 +75,9 @@ static size_t count_coherent(const run_result *r) {
 pb_status run_print(const run_result *r, pb_error *err) {
   const control_design *d = r->design;
   control_print_design(d);
-  printf("HAC runs %s, on channel hac; IFF %s\n",
+  pb_status status = control_print_margins(d, &r->judgement, err);
+  if (status != PB_OK) return status;
+  printf("\nHAC runs %s, on channel hac; IFF %s\n",
          d->options->hosted ? "in the daemon" : "in this client, over the bus",
          d->damped ? "in the daemon, on channel iff" : "is not used");
   printf("Disturbance: %s of %g rms on", pb_excitation_name(r->experiment.excitation),
@@ -83,7 +85,7 @@ pb_status run_print(const run_result *r, pb_error *err) {
   for (size_t j = 0; j < d->disturbances; j++)
     printf(" %s", d->model->input[d->disturbance[j]].name);
   printf(", %g … %g Hz\n", r->experiment.f1, r->experiment.f2);
-  pb_status status = print_stages(r, err);
+  status = print_stages(r, err);
   if (status == PB_OK) status = print_rms(r, err);
   if (status == PB_OK && r->nf > 0) {
     printf("\nSensitivity at the metrology: the largest σ(S) is within %.3g %% of the prediction "
@@ -134,6 +136,9 @@ pb_status run_print_json(const run_result *r, pb_error *err) {
   pb_jsonout_begin(&o, stdout);
   pb_jsonout_object(&o, NULL);
   control_json_design(&o, r->design);
+  pb_jsonout_object(&o, "margins");
+  control_json_margins(&o, r->design, &r->judgement);
+  pb_jsonout_object_end(&o);
   pb_jsonout_text(&o, "mode", r->bench->realtime ? "realtime" : "lockstep");
   pb_jsonout_text(&o, "hac_runs", r->design->options->hosted ? "hosted" : "client");
   pb_jsonout_object(&o, "stages");

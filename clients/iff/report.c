@@ -94,15 +94,33 @@ static void print_agreement(const char *what, const iff_measurement *m) {
         100.0 * (double)a->below / (double)a->lines);
 }
 
+// What the gain was sought for, and what it was not: modes that the loops cannot move.
+static void print_gain(const iff_result *r) {
+  const pb_best_gain *g = &r->best;
+  double smallest = INFINITY;
+  for (size_t k = 0; k < r->modes; k++)
+    smallest = fmin(smallest, r->mode[k].closed_predicted.damping);
+  if (!r->searched || g->left_out == 0)
+    printf("Smallest damping of these modes: %.4g %%%s\n", 100 * smallest,
+           r->searched ? ", the largest of all gains that can be doubled" : "");
+  if (!r->searched || g->left_out == 0) return;
+  printf("Smallest damping of the %zu modes that the loops can damp: %.4g %%, the largest of all "
+         "gains "
+         "that can be doubled\n",
+         g->modes, 100 * g->smallest_damping);
+  printf("Not counted are %zu that no gain damps beyond 1 %% and three times their own:",
+         g->left_out);
+  for (size_t k = 0; k < g->left_out; k++)
+    printf("%s %.5g Hz (%.3g %%, at most %.3g %%)", k ? "," : "", g->out_hz[k],
+           100 * g->out_damping[k], 100 * g->out_most[k]);
+  putchar('\n');
+}
+
 pb_status iff_print(const iff_result *r, pb_error *err) {
   print_head(r);
   pb_status status = print_modes(r, err);
   printf("\n");
-  double smallest = INFINITY;
-  for (size_t k = 0; k < r->modes; k++)
-    smallest = fmin(smallest, r->mode[k].closed_predicted.damping);
-  printf("Smallest damping of these modes: %.4g %%%s\n", 100 * smallest,
-         r->searched ? ", the gain sought among those that can be doubled" : "");
+  print_gain(r);
   print_agreement("Undamped", &r->open);
   print_agreement("Damped", &r->closed);
   if (!r->stable) {
@@ -173,6 +191,9 @@ static void json_attainable(pb_jsonout *j, const iff_result *r) {
   pb_jsonout_number(j, "smallest_damping", r->best.smallest_damping);
   pb_jsonout_numbers(j, "attainable_damping", r->best.attainable, r->best.modes);
   pb_jsonout_numbers(j, "attained_at_gain", r->best.attained_at, r->best.modes);
+  pb_jsonout_numbers(j, "left_out_hz", r->best.out_hz, r->best.left_out);
+  pb_jsonout_numbers(j, "left_out_damping", r->best.out_damping, r->best.left_out);
+  pb_jsonout_numbers(j, "left_out_most", r->best.out_most, r->best.left_out);
   pb_jsonout_object_end(j);
 }
 

@@ -11,6 +11,9 @@ void pb_best_gain_clear(pb_best_gain *best) {
   if (!best) return;
   free(best->attainable);
   free(best->attained_at);
+  free(best->out_hz);
+  free(best->out_damping);
+  free(best->out_most);
   *best = (pb_best_gain){0};
 }
 
@@ -88,24 +91,42 @@ static pb_status keep_margin(pb_loop_solver *s, const pb_rootlocus *l, bool *uns
   return status;
 }
 
-// Modes that no gain damps beyond 1 % and three times what they have are not counted against a
-// gain.
-static void forget_unreachable(pb_rootlocus *l) {
-  bool *counts = l->is_mode;
-  size_t reachable = 0;
-  for (int pass = 0; pass < 2; pass++) {
-    for (size_t b = 0; b < l->branches; b++) {
-      const pb_pole *p = l->pole + b * l->gains;
-      double most = 0;
-      for (size_t k = 1; k < l->gains; k++) {
-        if (p[k].damping > most) most = p[k].damping;
-      }
-      bool reached = l->is_mode[b] && most > 0.01 && most > 3 * p[0].damping;
-      if (pass == 0) reachable += reached;
-      if (pass == 1 && reachable > 0) counts[b] = reached;
-    }
+static double most_of(const pb_rootlocus *l, size_t branch) {
+  const pb_pole *p = l->pole + branch * l->gains;
+  double most = 0;
+  for (size_t k = 1; k < l->gains; k++) most = fmax(most, p[k].damping);
+  return most;
+}
+
+static bool is_reached(const pb_rootlocus *l, size_t branch) {
+  const double most = most_of(l, branch);
+  return l->is_mode[branch] && most > 0.01 && most > 3 * l->pole[branch * l->gains].damping;
+}
+
+static pb_status note_left_out(const pb_rootlocus *l, pb_best_gain *out, pb_error *err) {
+  out->out_hz = malloc((l->branches + 1) * sizeof *out->out_hz);
+  out->out_damping = malloc((l->branches + 1) * sizeof *out->out_damping);
+  out->out_most = malloc((l->branches + 1) * sizeof *out->out_most);
+  if (!out->out_hz || !out->out_damping || !out->out_most) return pb_fail_memory(err, "best gain");
+  for (size_t b = 0; b < l->branches; b++) {
+    if (!l->is_mode[b] || is_reached(l, b)) continue;
+    const pb_pole *p = l->pole + b * l->gains;
+    out->out_hz[out->left_out] = p->hz;
+    out->out_damping[out->left_out] = p->damping;
+    out->out_most[out->left_out++] = most_of(l, b);
   }
+  return PB_OK;
+}
+
+// Modes that no gain damps beyond 1 % and three times what they have are not counted against a
+// gain, unless there are no others.
+static pb_status forget_unreachable(pb_rootlocus *l, pb_best_gain *out, pb_error *err) {
+  size_t reachable = 0;
+  for (size_t b = 0; b < l->branches; b++) reachable += is_reached(l, b);
+  pb_status status = reachable > 0 ? note_left_out(l, out, err) : PB_OK;
+  for (size_t b = 0; b < l->branches && reachable > 0; b++) l->is_mode[b] = is_reached(l, b);
   for (size_t k = 0; k < l->gains; k++) pb_rootlocus_find_smallest(l, k);
+  return status;
 }
 
 // What the modes have at gain k where that is more than was attained so far.
@@ -187,8 +208,8 @@ pb_status pb_best_gain_find(pb_loop_solver *s, double f1, double f2, double deca
     l.gain[k] = unit * pow(10, decades * (2 * step - 1));
   }
   status = pb_rootlocus_follow(s, &l, err);
+  if (status == PB_OK) status = forget_unreachable(&l, out, err);
   if (status == PB_OK) {
-    forget_unreachable(&l);
     status = keep_margin(s, &l, unstable, &limit, err);
   }
   if (status == PB_OK) status = attainable(&l, unstable, out, err);

@@ -6,8 +6,10 @@
 
 #include "control/lti_ops.h"
 
-pb_hac_shape pb_hac_shape_default(double bandwidth_hz) {
-  return (pb_hac_shape){bandwidth_hz, 9, bandwidth_hz / 10, 10 * bandwidth_hz};
+pb_hac_shape pb_hac_shape_default(double bandwidth_hz, double sample_rate) {
+  const double lowpass = fmin(10 * bandwidth_hz, 0.4 * sample_rate);
+  return (pb_hac_shape){bandwidth_hz, 9, bandwidth_hz / 10,
+                        lowpass < 3 * bandwidth_hz ? 0 : lowpass};
 }
 
 static pb_status check_shape(const pb_hac_shape *s, double rate, pb_error *err) {

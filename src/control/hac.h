@@ -28,8 +28,9 @@ typedef struct pb_hac_shape {
   double lowpass_hz;     // ω_l/2π; 0: none
 } pb_hac_shape;
 
-// Lead 9 (53° at the crossover), integrator at a tenth of the bandwidth, low-pass at ten times it.
-pb_hac_shape pb_hac_shape_default(double bandwidth_hz);
+// Lead 9 (53° at the crossover), integrator at a tenth of the bandwidth, low-pass at ten times it,
+// but not beyond 0.4 of the sample rate; none where that is less than three times the bandwidth.
+pb_hac_shape pb_hac_shape_default(double bandwidth_hz, double sample_rate);
 
 // H at a sample rate, one input and output. PB_ERR_ARGUMENT: a corner at or above half the sample
 // rate, a lead below 1, a bandwidth that is not positive.

@@ -5,14 +5,22 @@
 #include <stdbool.h>
 #include <stdlib.h>
 
+#include "control/arc.h"
+
 // arg L + π in −π … π: the angle to the point −1 as seen from 0.
 static double angle_to_minus_one(double complex l) {
   return carg(-l);
 }
 
 static void at_unit_gain(pb_margins *m, double hz, double complex l) {
-  double phase = fabs(angle_to_minus_one(l)) * 180 / M_PI;
+  const double angle = angle_to_minus_one(l), phase = fabs(angle) * 180 / M_PI;
+  // Delay turns L clockwise.
+  const double delay = (angle > 0 ? angle : angle + 2 * M_PI) / (2 * M_PI * hz);
   m->crossover_hz = hz;
+  if (delay < m->delay) {
+    m->delay = delay;
+    m->delay_hz = hz;
+  }
   if (phase < m->phase_degree) {
     m->phase_degree = phase;
     m->phase_hz = hz;
@@ -36,25 +44,6 @@ static bool above_unity(double log_gain) {
   return log_gain > 1e-6;
 }
 
-// L near a few neighbours: (l + b x)/(1 + c x), x Hz from the first of them. Beside one resonance,
-// and far from all, L is very nearly of this form.
-typedef struct arc {
-  double complex l, b, c;
-} arc;
-
-// Through three points, at 0, x1 and x2; a straight line through the first two where there is none.
-static arc arc_through(double x1, double x2, double complex l0, double complex l1,
-                       double complex l2) {
-  double complex slope1 = (l1 - l0) / x1, slope2 = (l2 - l0) / x2;
-  double complex c = (slope1 - slope2) / (l2 - l1);
-  if (!isfinite(cabs(c))) c = 0;
-  return (arc){l0, slope1 + c * l1, c};
-}
-
-static double complex arc_at(const arc *a, double x) {
-  return (a->l + a->b * x) / (1 + a->c * x);
-}
-
 static bool is_above(double complex l) {
   return above_unity(log(cabs(l)));
 }
@@ -64,12 +53,12 @@ static bool is_beyond(double complex l) {
 }
 
 // Where a side changes between 0 and x1, by bisection.
-static double change(const arc *a, double x1, bool side(double complex)) {
+static double change(const pb_arc *a, double x1, bool side(double complex)) {
   double low = 0, high = x1;
   bool first = side(a->l);
   for (int k = 0; k < 50; k++) {
     double middle = 0.5 * (low + high);
-    *(side(arc_at(a, middle)) == first ? &low : &high) = middle;
+    *(side(pb_arc_at(a, middle)) == first ? &low : &high) = middle;
   }
   return high;
 }
@@ -77,20 +66,47 @@ static double change(const arc *a, double x1, bool side(double complex)) {
 // Crossings between points f and f + 1.
 static void between(pb_margins *m, const double *hz, size_t nf, const double complex *l,
                     size_t stride, size_t f) {
-  size_t third = f + 2 < nf ? f + 2 : f > 0 ? f - 1 : f + 1;
-  double complex l0 = l[f * stride], l1 = l[(f + 1) * stride], l2 = l[third * stride];
+  double complex l0 = l[f * stride], l1 = l[(f + 1) * stride];
   double x1 = hz[f + 1] - hz[f];
-  arc a = arc_through(x1, hz[third] - hz[f], l0, l1, l2);
+  pb_arc a = pb_arc_of(hz, nf, l, stride, f);
   if (is_above(l0) != is_above(l1)) {
     double x = change(&a, x1, is_above);
-    at_unit_gain(m, hz[f] + x, arc_at(&a, x));
+    at_unit_gain(m, hz[f] + x, pb_arc_at(&a, x));
   }
   // From one side of the negative axis to the other, not through the positive one.
   double turn = angle_to_minus_one(l1) - angle_to_minus_one(l0);
   if (is_beyond(l0) != is_beyond(l1) && fabs(turn) < M_PI) {
     double x = change(&a, x1, is_beyond);
-    at_real_axis(m, hz[f] + x, creal(arc_at(&a, x)));
+    at_real_axis(m, hz[f] + x, creal(pb_arc_at(&a, x)));
   }
+}
+
+// The least |1 + L| between points f and f + 1, by golden section: there is one turn between
+// neighbours at most.
+static void nearest(pb_margins *m, const double *hz, size_t nf, const double complex *l,
+                    size_t stride, size_t f) {
+  static const double ratio = 0.6180339887498949;
+  double low = 0, high = hz[f + 1] - hz[f];
+  pb_arc a = pb_arc_of(hz, nf, l, stride, f);
+  for (int k = 0; k < 60; k++) {
+    double left = high - ratio * (high - low), right = low + ratio * (high - low);
+    if (cabs(1 + pb_arc_at(&a, left)) < cabs(1 + pb_arc_at(&a, right)))
+      high = right;
+    else
+      low = left;
+  }
+  double x = 0.5 * (low + high), distance = cabs(1 + pb_arc_at(&a, x));
+  if (!(distance < m->modulus)) return;
+  m->modulus = distance;
+  m->modulus_hz = hz[f] + x;
+}
+
+static void refine_modulus(pb_margins *m, const double *hz, size_t nf, const double complex *l,
+                           size_t stride) {
+  size_t at = 0;
+  while (at < nf && hz[at] != m->modulus_hz) at++;
+  if (at > 0 && at < nf) nearest(m, hz, nf, l, stride, at - 1);
+  if (at + 1 < nf) nearest(m, hz, nf, l, stride, at);
 }
 
 // At 0 Hz and at half the sample rate a loop is real: it reaches the axis without crossing it.
@@ -105,6 +121,8 @@ pb_margins pb_margins_of(const double *hz, size_t nf, const double complex *l, s
                   .gain_up = INFINITY,
                   .gain_up_hz = NAN,
                   .gain_down_hz = NAN,
+                  .delay = INFINITY,
+                  .delay_hz = NAN,
                   .modulus = INFINITY,
                   .modulus_hz = NAN};
   for (size_t f = 0; f < nf; f++) {
@@ -116,6 +134,7 @@ pb_margins pb_margins_of(const double *hz, size_t nf, const double complex *l, s
     }
     if (f + 1 < nf) between(&m, hz, nf, l, stride, f);
   }
+  refine_modulus(&m, hz, nf, l, stride);
   if (nf > 0 && hz[0] == 0) at_end(&m, 0, l[0]);
   if (nf > 0) at_end(&m, hz[nf - 1], l[(nf - 1) * stride]);
   return m;

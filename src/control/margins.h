@@ -2,7 +2,9 @@
 //
 // One loop, L(jω) with negative feedback: gain margin where L crosses the negative real axis (a
 // factor above 1 that makes it unstable, and one below 1 where less gain does), phase margin where
-// |L| = 1, modulus margin min |1 + L| = 1/max |S|. Several loops: the same of each characteristic
+// |L| = 1, delay margin the dead time that turns L to −1 at one of these frequencies (the highest
+// decides it as a rule, whatever the phase margin of the lowest), modulus margin
+// min |1 + L| = 1/max |S|. Several loops: the same of each characteristic
 // locus λ_i(L(jω)), and the largest singular values of S = (I + L)⁻¹ and T = L S (S. Skogestad, I.
 // Postlethwaite, "Multivariable Feedback Control", chapters 3, 4 and 9). Margins are distances;
 // that the loop is stable is for the closed-loop poles to say.
@@ -21,7 +23,9 @@ typedef struct pb_margins {
   double phase_degree, phase_hz;   // smallest over all |L| = 1; infinite where there is none
   double gain_up, gain_up_hz;      // smallest factor > 1 to the border; infinite: none
   double gain_down, gain_down_hz;  // largest factor < 1 to the border; 0: none
-  double modulus, modulus_hz;      // min |1 + L|
+  double delay,
+      delay_hz;  // s, smallest over all |L| = 1 of what turns L there to −1; infinite: none
+  double modulus, modulus_hz;  // min |1 + L|, between the points of the grid too
 } pb_margins;
 
 // Margins of l[f · stride] at hz[nf], ascending: crossings lie on arcs through three neighbours, as
@@ -40,7 +44,7 @@ typedef struct pb_mimo {
   double complex *locus;  // [nf][n] eigenvalues of L, each column one continuous locus
   double *s, *t;          // [nf] largest singular value of S and of T
   pb_margins *margins;    // [n] of the loci
-  double s_peak, s_peak_hz, t_peak, t_peak_hz;
+  double s_peak, s_peak_hz, t_peak, t_peak_hz;  // between the points too
   double s_low_hz;  // up to here the largest singular value of S stays below 1/√2; 0: nowhere
 } pb_mimo;
 

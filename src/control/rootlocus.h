@@ -34,6 +34,8 @@ typedef struct pb_best_gain {
   size_t modes;             // of the band
   double *attainable;       // [modes] largest damping of each mode over all gains tried, owned
   double *attained_at;      // [modes] the gain of it, owned
+  size_t left_out;          // modes of the band that do not count
+  double *out_hz, *out_damping, *out_most;  // [left_out] without the loop; the most of any gain
 } pb_best_gain;
 
 // Searches a logarithmic range of gains around the one where the loop gain is 1, over `decades`

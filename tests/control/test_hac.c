@@ -81,7 +81,7 @@ static void test_gains(void **state) {
   enum { NF = 400 };
   for (int polarity = -1; polarity <= 1; polarity += 2) {
     pb_model *m = two_struts(polarity);
-    pb_hac_shape shape = pb_hac_shape_default(60);
+    pb_hac_shape shape = pb_hac_shape_default(60, 1e4);
     const pb_hac_frame frame = {0};
     pb_lti h;
     double hz[NF + 1], gain[2];
@@ -175,7 +175,7 @@ static bool dense_stable(const pb_loop *loop, double gain) {
 static void test_large(void **state) {
   (void)state;
   pb_model *m = large_plant();
-  pb_hac_shape shape = pb_hac_shape_default(60);
+  pb_hac_shape shape = pb_hac_shape_default(60, 1e4);
   const pb_hac_frame frame = {0};
   const double hz[2] = {60, 0.6};
   double complex plant[8];

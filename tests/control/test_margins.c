@@ -25,16 +25,36 @@ static void test_third_order(void **state) {
   for (int k = 0; k < N; k++) {
     double complex s1 = 1 + s_at(k);
     l[k] = 4 / (s1 * s1 * s1);
-    nearest = fmin(nearest, cabs(1 + l[k]));
   }
+  for (double w = 0.5; w < 5; w += 1e-5)  // far finer than the grid
+    nearest = fmin(nearest, cabs(1 + 4 / cpow(1 + I * w, 3)));
   pb_margins m = pb_margins_of(hz, N, l, 1);
   double crossover = sqrt(pow(4, 2.0 / 3) - 1);
   ASSERT_RELATIVE(m.gain_up, 2, 1e-4);
   ASSERT_RELATIVE(m.gain_up_hz, sqrt(3) / (2 * M_PI), 1e-4);
   ASSERT_RELATIVE(m.crossover_hz, crossover / (2 * M_PI), 1e-4);
   ASSERT_NEAR(m.phase_degree, 180 - 3 * atan(crossover) * 180 / M_PI, 1e-2);
-  ASSERT_NEAR(m.modulus, nearest, 0);
+  ASSERT_RELATIVE(m.modulus, nearest, 1e-7);
+  ASSERT_RELATIVE(m.delay, (M_PI - 3 * atan(crossover)) / crossover, 1e-4);
   assert_true(m.gain_down == 0 && isnan(m.gain_down_hz));
+}
+
+// An integrator of 90° of phase margin, and a resonance far above it that just reaches 1: that one
+// decides how much delay the loop stands, a part of what the phase margin lets one expect.
+static void test_delay_margin(void **state) {
+  (void)state;
+  double complex l[N];
+  for (int k = 0; k < N; k++) {
+    double complex s = s_at(k);
+    l[k] = 1 / s + 6 * s / (s * s + 4 * s + 400);
+  }
+  pb_margins m = pb_margins_of(hz, N, l, 1);
+  assert_true(m.delay_hz > 10 / (2 * M_PI));
+  double w = 2 * M_PI * m.delay_hz;
+  double complex s = I * w, there = 1 / s + 6 * s / (s * s + 4 * s + 400);
+  ASSERT_NEAR(cabs(there), 1, 1e-4);
+  ASSERT_NEAR(cabs(there * cexp(-s * m.delay) + 1), 0, 1e-3);  // turned to −1
+  assert_true(m.delay < m.phase_degree * M_PI / 180 / (2 * M_PI * m.phase_hz));
 }
 
 // (s + 1)²/s³ is stable and is not with half the gain: L(j) = −2.
@@ -169,9 +189,9 @@ static void test_grid(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_third_order), cmocka_unit_test(test_conditional),
-      cmocka_unit_test(test_edges),       cmocka_unit_test(test_resonance),
-      cmocka_unit_test(test_swaps),       cmocka_unit_test(test_loci),
-      cmocka_unit_test(test_grid)};
+      cmocka_unit_test(test_third_order), cmocka_unit_test(test_delay_margin),
+      cmocka_unit_test(test_conditional), cmocka_unit_test(test_edges),
+      cmocka_unit_test(test_resonance),   cmocka_unit_test(test_swaps),
+      cmocka_unit_test(test_loci),        cmocka_unit_test(test_grid)};
   return cmocka_run_group_tests(tests, make_grid, NULL);
 }

@@ -20,7 +20,7 @@ enum { GRID = 400 };
 static void design(hexapod *p, const char *file, double bandwidth) {
   pb_warnings warnings = {0};
   pb_iff law = pb_iff_default(1000);
-  pb_hac_shape shape = pb_hac_shape_default(bandwidth);
+  pb_hac_shape shape = pb_hac_shape_default(bandwidth, 1e4);
   const pb_hac_frame frame = {0};
   static double complex plant[36 * (GRID + 1)];
   double hz[GRID + 1];

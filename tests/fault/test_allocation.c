@@ -161,7 +161,7 @@ static pb_status hac(const pb_model *model, pb_lti *shape, pb_lti *controller, p
   const size_t input = 0, output = 1;
   const pb_hac_channels channels = {1, &input, NULL, &output};
   const pb_hac_frame frame = {0};
-  const pb_hac_shape wanted = pb_hac_shape_default(100);
+  const pb_hac_shape wanted = pb_hac_shape_default(100, 1e4);
   pb_pole pole = {0, 90, 0.01};
   const pb_pole_list poles = {.count = 1, .item = &pole};
   double complex plant[64], l[64];

@@ -10,3 +10,4 @@ pb_test(fit LABELS unit SOURCES test_fit.c)
 
 # Experiments of plantbus-identify and plantbus-iff, on a plant stepped in the test.
 pb_test(experiment LABELS unit SOURCES test_experiment.c fake_session.c LIBS plantbus_experiment)
+pb_test(pole_match LABELS unit SOURCES test_pole_match.c)
