@@ -2,7 +2,8 @@
 // - KEEP_LAST writers never block on a reader that stopped; only requests, where each one counts,
 //   are kept all, and then the client is the one that may block. The trace is kept all, too: its
 //   writer does not block but refuses, and lockstep waits with the next step.
-// - sample and command are ordered by reception: clocks of two hosts need not agree.
+// - everything is ordered by reception: clocks of two hosts need not agree, and what comes after a
+//   wall clock was set back is not older than what a reader has.
 // - reply and block_reply are TRANSIENT_LOCAL: an answer survives a match that is completed late.
 //   A client has one block on its way, so that one answer is kept for each.
 // - latency budgets stay 0: a positive one would hold a sample back until the next write.
@@ -17,31 +18,30 @@ typedef struct topic_row {
   int depth;        // of the history; 0: keep all
   int limit;        // of samples held when all are kept
   int blocking_ms;  // longest time a write may block
-  bool by_reception;
   bool manual_liveliness;
 } topic_row;
 
 static const topic_row table[PB_TOPIC_COUNT] = {
     [PB_TOPIC_DESCRIPTION] = {"plantbus/v1/description", &plantbus_PlantDescription_desc,
-                              DDS_DURABILITY_TRANSIENT_LOCAL, 1, 0, 50, false, false},
+                              DDS_DURABILITY_TRANSIENT_LOCAL, 1, 0, 50, false},
     [PB_TOPIC_STATUS] = {"plantbus/v1/status", &plantbus_PlantStatus_desc,
-                         DDS_DURABILITY_TRANSIENT_LOCAL, 1, 0, 5, false, false},
+                         DDS_DURABILITY_TRANSIENT_LOCAL, 1, 0, 5, false},
     [PB_TOPIC_SAMPLE] = {"plantbus/v1/sample", &plantbus_Sample_desc, DDS_DURABILITY_VOLATILE, 1, 0,
-                         5, true, false},
+                         5, false},
     [PB_TOPIC_COMMAND] = {"plantbus/v1/command", &plantbus_Command_desc, DDS_DURABILITY_VOLATILE, 1,
-                          0, 5, true, true},
+                          0, 5, true},
     [PB_TOPIC_REQUEST] = {"plantbus/v1/request", &plantbus_Request_desc, DDS_DURABILITY_VOLATILE, 0,
-                          1024, 1000, false, false},
+                          1024, 1000, false},
     [PB_TOPIC_REPLY] = {"plantbus/v1/reply", &plantbus_Reply_desc, DDS_DURABILITY_TRANSIENT_LOCAL,
-                        4, 0, 5, false, false},
+                        4, 0, 5, false},
     [PB_TOPIC_EVENT] = {"plantbus/v1/event", &plantbus_Event_desc, DDS_DURABILITY_VOLATILE, 256, 0,
-                        5, false, false},
+                        5, false},
     [PB_TOPIC_BLOCK_REQUEST] = {"plantbus/v1/block_request", &plantbus_BlockRequest_desc,
-                                DDS_DURABILITY_VOLATILE, 8, 0, 50, false, false},
+                                DDS_DURABILITY_VOLATILE, 8, 0, 50, false},
     [PB_TOPIC_BLOCK_REPLY] = {"plantbus/v1/block_reply", &plantbus_BlockReply_desc,
-                              DDS_DURABILITY_TRANSIENT_LOCAL, 1, 0, 50, false, false},
+                              DDS_DURABILITY_TRANSIENT_LOCAL, 1, 0, 50, false},
     [PB_TOPIC_TRACE] = {"plantbus/v1/trace", &plantbus_Sample_desc, DDS_DURABILITY_VOLATILE, 0,
-                        DDS_LENGTH_UNLIMITED, 0, true, false},
+                        DDS_LENGTH_UNLIMITED, 0, false},
 };
 
 const char *pb_topic_name(pb_topic topic) {
@@ -68,8 +68,7 @@ dds_qos_t *pb_topic_qos(pb_topic topic) {
   if (row->durability == DDS_DURABILITY_TRANSIENT_LOCAL)
     dds_qset_durability_service(qos, 0, DDS_HISTORY_KEEP_LAST, row->depth, DDS_LENGTH_UNLIMITED,
                                 DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
-  dds_qset_destination_order(qos, row->by_reception ? DDS_DESTINATIONORDER_BY_RECEPTION_TIMESTAMP
-                                                    : DDS_DESTINATIONORDER_BY_SOURCE_TIMESTAMP);
+  dds_qset_destination_order(qos, DDS_DESTINATIONORDER_BY_RECEPTION_TIMESTAMP);
   // A reader that asks for an infinite lease matches a writer with any.
   if (row->manual_liveliness)
     dds_qset_liveliness(qos, DDS_LIVELINESS_MANUAL_BY_TOPIC, DDS_INFINITY);

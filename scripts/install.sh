@@ -6,7 +6,7 @@ set -eu
 packages="build-essential cmake ninja-build pkg-config
   cyclonedds-dev cyclonedds-tools libcjson-dev libmatio-dev libopenblas-dev liblapack-dev
   libsuitesparse-dev liblz4-dev libzstd-dev libssl-dev libsystemd-dev libcmocka-dev gnuplot-nox fonts-dejavu-core
-  iproute2 valgrind"
+  iproute2 valgrind libfaketime"
 
 missing=""
 for package in $packages; do

@@ -23,10 +23,11 @@ uint64_t record_wall_clock(const recorder *r) {
 static uint64_t log_time(recorder *r, int64_t source) {
   static const int64_t most = 1000000000;  // that a message may be under way, ns
   const int64_t now = (int64_t)record_wall_clock(r);
-  if (source <= 0) return (uint64_t)now;
   const int64_t late = now - (source + r->source_offset);
   if (late > most || late < -most / 10) r->source_offset = now - source;
-  return (uint64_t)(source + r->source_offset);
+  const int64_t time = source > 0 ? source + r->source_offset : now;
+  if (time > r->logged) r->logged = time;  // topics are taken one by one: it never goes back
+  return (uint64_t)r->logged;
 }
 
 bool record_participant(dds_entity_t reader, dds_instance_handle_t writer, dds_guid_t *out) {

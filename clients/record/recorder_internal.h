@@ -47,6 +47,7 @@ typedef struct recorder {
   int64_t flushed, synced;               // monotonic, ns
   int64_t wall_offset;                   // from the monotonic clock to the wall clock, at the start
   int64_t source_offset;                 // from the writers' clock to the recorder's
+  int64_t logged;                        // log time of the last message
   bool done;
 } recorder;
 
